@@ -1,0 +1,48 @@
+"""Protobuf types and type adapters for ROS 2 interfaces.
+
+The names here are imported when they are first asked for: generated packages import `rosidl_adapter_proto.adapter`
+through this package, and that must stay cheap.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rosidl_adapter_proto.errors import (
+        ConversionError,
+        DefinitionError,
+        Error,
+        GenerateError,
+        SchemaError,
+    )
+    from rosidl_adapter_proto.schema.numbering import compute_proto_field_number
+    from rosidl_adapter_proto.schema.typemap import (
+        MSG_TYPE_TO_PROTO,
+        PROTO_ACTION_GET_RESULT_CALL_NAME,
+        PROTO_ACTION_SEND_GOAL_CALL_NAME,
+        PROTO_PACKAGE_POSTFIX,
+        PROTO_SERVICE_CALL_NAME,
+    )
+
+__all__ = [
+    "MSG_TYPE_TO_PROTO",
+    "PROTO_ACTION_GET_RESULT_CALL_NAME",
+    "PROTO_ACTION_SEND_GOAL_CALL_NAME",
+    "PROTO_PACKAGE_POSTFIX",
+    "PROTO_SERVICE_CALL_NAME",
+    "ConversionError",
+    "DefinitionError",
+    "Error",
+    "GenerateError",
+    "SchemaError",
+    "compute_proto_field_number",
+]
+
+
+def __getattr__(name: str) -> Any:
+    for module in ("errors", "schema.typemap", "schema.numbering"):
+        if name in __all__ and hasattr(imported := importlib.import_module(f"{__name__}.{module}"), name):
+            return getattr(imported, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

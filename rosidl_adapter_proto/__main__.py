@@ -1,0 +1,5 @@
+"""Runs the command line as `python -m rosidl_adapter_proto`."""
+
+from rosidl_adapter_proto.cli import main
+
+main()

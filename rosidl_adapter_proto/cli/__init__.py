@@ -1,0 +1,58 @@
+"""The command line, `rosidl-proto`: parses, calls, prints.
+
+Exit codes: 0 done; 1 `--check` found something stale; 2 the command line or its configuration is wrong; 3 the work
+could not be done (a definition, a lock file, the output folder or protoc is at fault); 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+
+import click
+
+from rosidl_adapter_proto.cli.completion import completion_command
+from rosidl_adapter_proto.cli.configuration import ConfiguredGroup
+from rosidl_adapter_proto.cli.generate import generate_command
+from rosidl_adapter_proto.cli.list import list_command
+from rosidl_adapter_proto.cli.show import show_command
+from rosidl_adapter_proto.errors import Error
+
+EXIT_STALE = 1
+EXIT_USAGE = 2
+EXIT_FAILED = 3
+EXIT_INTERRUPTED = 130
+
+
+@click.group(cls=ConfiguredGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="rosidl-adapter-proto")
+@click.option("--debug", is_flag=True, help="Show where in the program an error comes from.")
+def program(debug: bool) -> None:
+    """Protobuf types and adapters from ROS 2 interface definitions.
+
+    Settings are also read from [tool.rosidl-proto] of pyproject.toml in the current folder or above it; the command
+    line comes first.
+    """
+
+
+for command in (generate_command, list_command, show_command, completion_command):
+    program.add_command(command)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line, and exit."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        status = program.main(arguments, prog_name="rosidl-proto", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; the output is as it was", err=True)
+        sys.exit(EXIT_INTERRUPTED)
+    except Error as error:
+        if "--debug" in arguments:
+            traceback.print_exc()
+        click.echo(f"error: {error}", err=True)
+        sys.exit(EXIT_FAILED)
+    sys.exit(status or 0)

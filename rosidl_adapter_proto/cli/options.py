@@ -1,0 +1,117 @@
+"""What several commands share: how arguments become sources and a request."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from rosidl_adapter_proto.generate import Request
+from rosidl_adapter_proto.interfaces import store
+from rosidl_adapter_proto.interfaces.model import TypeName
+from rosidl_adapter_proto.interfaces.sources import (
+    SUFFIXES,
+    Source,
+    Sources,
+    file_source,
+    folder_source,
+    prefix_sources,
+    store_source,
+)
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def source_options(command: Command) -> Command:
+    """Add the options that say where definitions come from."""
+    command = click.option(
+        "--include",
+        "-I",
+        type=click.Path(path_type=Path),
+        multiple=True,
+        help="A package folder, or a folder of packages, to find definitions in. May be repeated.",
+    )(command)
+    return click.option(
+        "--distro",
+        metavar="NAME",
+        help="The ROS distribution whose embedded definitions stand in for packages found nowhere else "
+        "(default: $ROS_DISTRO, else the newest).",
+    )(command)
+
+
+def find_sources(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Sources:
+    """Return every source in the order they win: `first`, included folders, ROS installations, the store."""
+    folders = [folder_source(_existing(path)) for path in include]
+    return Sources((*first, *folders, *prefix_sources(), store_source(distro)))
+
+
+def find_request(
+    what: Sequence[str], include: Iterable[Path], distro: str | None, dependencies: bool
+) -> tuple[Request, Sources]:
+    """Return what the arguments of a command ask for, and where definitions come from.
+
+    Args:
+        what: Packages, types, folders and files.
+        include: Folders to find definitions in.
+        distro: The distribution of the embedded store.
+        dependencies: Whether dependencies are asked for as well.
+    """
+    given: list[Source] = []
+    packages: list[str] = []
+    types: list[TypeName] = []
+    names: list[str] = []
+    for text in what:
+        path = Path(text)
+        if path.suffix in SUFFIXES:
+            source, name = file_source(_existing(path))
+            given.append(source)
+            types.append(name)
+        elif text.startswith((".", "/")) or "\\" in text or text.endswith("/"):
+            source = folder_source(_existing(path))
+            given.append(source)
+            packages += source.packages
+        else:
+            names.append(text)
+    sources = find_sources(include, distro, _merged(given))
+    for text in names:
+        if text not in sources.packages and Path(text).is_dir():
+            source = folder_source(Path(text))
+            sources = Sources((source, *sources.sources))
+            packages += source.packages
+        elif "/" in text:
+            types.append(sources.full_name(text))
+        else:
+            sources.package(text)
+            packages.append(text)
+    return Request(tuple(packages), tuple(types), dependencies), sources
+
+
+def _merged(given: Iterable[Source]) -> list[Source]:
+    """Join the files of one package that were named one by one."""
+    merged: list[Source] = []
+    for source in given:
+        if merged and set(merged[-1].packages) == set(source.packages):
+            last = merged.pop()
+            packages = {name: {**source.packages[name], **last.packages[name]} for name in source.packages}
+            source = Source(last.origin, packages)
+        merged.append(source)
+    return merged
+
+
+def _existing(path: Path) -> Path:
+    if not path.exists():
+        raise click.UsageError(f"there is no file or folder {path}")
+    return path
+
+
+def complete_package(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Return the packages that begin with what was typed."""
+    sources = find_sources((), None)
+    return sorted(name for name in sources.packages if name.startswith(incomplete))
+
+
+def complete_distro(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Return the distributions that begin with what was typed."""
+    return [name for name in store.distributions() if name.startswith(incomplete)]

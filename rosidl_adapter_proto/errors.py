@@ -1,0 +1,42 @@
+"""The exceptions of the project: one for each layer, all under `Error`.
+
+A message says what is wrong, where (file, line and column, or the path of the field) and what to do.
+"""
+
+from __future__ import annotations
+
+
+class Error(Exception):
+    """The base of every error that this project raises on purpose."""
+
+
+class DefinitionError(Error):
+    """An interface definition cannot be found, read or understood."""
+
+
+class SchemaError(Error):
+    """An interface cannot be mapped to protobuf, or a lock file disagrees with it."""
+
+
+class GenerateError(Error):
+    """Files cannot be generated or written."""
+
+
+class ConversionError(Error):
+    """A value does not fit the type on the other side.
+
+    Attributes:
+        type_name: The type that was being converted, such as `sensor_msgs/msg/Image`.
+        field_path: Where in it, such as `header.stamp.sec` or `points[3].x`; empty for the message itself.
+        reason: What is wrong there.
+    """
+
+    def __init__(self, type_name: str, field_path: str, reason: str) -> None:
+        self.type_name = type_name
+        self.field_path = field_path
+        self.reason = reason
+        where = f"{type_name}.{field_path}" if field_path else type_name
+        super().__init__(f"{where}: {reason}")
+
+    def __reduce__(self) -> tuple[type[ConversionError], tuple[str, str, str]]:
+        return type(self), (self.type_name, self.field_path, self.reason)

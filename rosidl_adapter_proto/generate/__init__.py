@@ -1,0 +1,252 @@
+"""Generates `.proto` files, protobuf classes and adapters: `generate` is what every command and hook calls."""
+
+from __future__ import annotations
+
+import json
+import keyword
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from rosidl_adapter_proto.errors import GenerateError
+from rosidl_adapter_proto.generate.layout import (
+    Changes,
+    changes,
+    check_ours,
+    make_manifest,
+    replace_file,
+    write,
+)
+from rosidl_adapter_proto.generate.manifest import digest, is_intact, read_manifest
+from rosidl_adapter_proto.interfaces.model import TypeName
+from rosidl_adapter_proto.interfaces.sources import Sources, closure
+from rosidl_adapter_proto.schema.numbering import (
+    LOCK_FILE_NAME,
+    HashNumbering,
+    Numbering,
+    SequentialNumbering,
+)
+from rosidl_adapter_proto.schema.proto import check_names, proto_file
+
+Progress = Callable[[int, int], None]
+"""Is told how many interfaces are done, and how many there are."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to generate.
+
+    Attributes:
+        packages: Packages, which are generated whole.
+        types: Single interfaces.
+        dependencies: Whether to generate what these refer to as well.
+    """
+
+    packages: tuple[str, ...] = ()
+    types: tuple[TypeName, ...] = ()
+    dependencies: bool = True
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to generate.
+
+    Attributes:
+        numbering: How fields are numbered: `hash` or `sequential`.
+        lock_file: Where sequential numbers are kept.
+        events: Whether services get their `_Event` messages.
+        python_root: The namespace package that the generated packages are in.
+    """
+
+    numbering: str = "hash"
+    lock_file: Path = Path(LOCK_FILE_NAME)
+    events: bool = False
+    python_root: str = "rosidl_proto"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run did, or would do.
+
+    Attributes:
+        interfaces: What was generated.
+        changes: What changed in the output folder.
+        lock_changed: Whether the lock file changed.
+        warnings: What the user should know.
+    """
+
+    interfaces: tuple[TypeName, ...]
+    changes: Changes
+    lock_changed: bool = False
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the folder or the lock file were not what the definitions make of them."""
+        return self.changes.any or self.lock_changed
+
+
+def generate(
+    request: Request,
+    sources: Sources,
+    output: Path,
+    options: Options = Options(),
+    *,
+    check: bool = False,
+    progress: Progress | None = None,
+) -> Result:
+    """Generate everything for a request into a folder.
+
+    Args:
+        request: What to generate.
+        sources: Where definitions come from.
+        output: The folder to write; it then holds what this call makes, and nothing that an earlier one made.
+        options: How to generate.
+        check: Only find out what would change.
+        progress: Is called while interfaces are done.
+
+    Raises:
+        DefinitionError: A definition is missing or not valid.
+        SchemaError: An interface cannot be mapped to protobuf, or the lock file disagrees.
+        GenerateError: The folder is not ours or cannot be written, or protoc failed.
+    """
+    check_ours(output)
+    lock_text = _read_lock(options)
+    old = read_manifest(output)
+    if old is not None and is_intact(output, old):
+        names = [TypeName.parse(name) for name in old.interfaces]
+        if old.fingerprint == _fingerprint(request, sources, options, lock_text, names):
+            unchanged = Changes((), (), len(old.outputs))
+            return Result(tuple(names), unchanged, False, _warnings(sources, names))
+
+    names = closure(sources, request.packages, request.types, events=options.events)
+    numbering = _numbering(options, lock_text)
+    files = _generate_files(names, request, sources, options, numbering, progress)
+    new_lock_text = numbering.lock_text() if isinstance(numbering, SequentialNumbering) else lock_text
+    fingerprint = _fingerprint(request, sources, options, new_lock_text, names)
+    manifest = make_manifest(fingerprint, map(str, names), files)
+    planned = changes(output, manifest, files)
+    if not check:
+        if planned.any:
+            write(output, manifest, files, planned)
+        if new_lock_text is not None and new_lock_text != lock_text:
+            replace_file(options.lock_file, new_lock_text.encode())
+    return Result(tuple(names), planned, new_lock_text != lock_text, _warnings(sources, names))
+
+
+def proto_text(name: TypeName, sources: Sources, options: Options = Options()) -> str:
+    """Return the `.proto` file of an interface.
+
+    Raises:
+        DefinitionError: A definition is missing or not valid.
+        SchemaError: The interface cannot be mapped to protobuf.
+    """
+    from rosidl_adapter_proto.generate.render import render
+
+    numbering = _numbering(options, _read_lock(options))
+    interface = sources.definition(name).interface
+    file = proto_file(interface, numbering, sources.definition_name, events=options.events)
+    return render("proto/interface.proto.jinja", file=file)
+
+
+def _generate_files(
+    names: list[TypeName],
+    request: Request,
+    sources: Sources,
+    options: Options,
+    numbering: Numbering,
+    progress: Progress | None,
+) -> dict[str, bytes]:
+    """Return the content of every file of the output folder, by its path."""
+    # These are slow to import, and a run with nothing to do does not need them.
+    from rosidl_adapter_proto.generate.protoc import compile_protos
+    from rosidl_adapter_proto.generate.python import Names, python_modules
+    from rosidl_adapter_proto.generate.render import render, render_modules, render_packages
+
+    if keyword.iskeyword(options.python_root) or not options.python_root.isidentifier():
+        raise GenerateError(f"{options.python_root!r} cannot be the name of a Python package")
+    protos = [
+        proto_file(
+            sources.definition(name).interface, numbering, sources.definition_name, events=options.events
+        )
+        for name in names
+    ]
+    check_names(protos)
+    texts = {file.path: render("proto/interface.proto.jinja", file=file) for file in protos}
+    wanted = [file for file in protos if _is_wanted(file.source.name, request)]
+    descriptors = compile_protos(texts, [file.path for file in wanted])
+    python_names = Names(options.python_root, sources)
+    modules = [python_modules(file, python_names) for file in wanted]
+
+    files = {f"proto/{file.path}": texts[file.path].encode() for file in wanted}
+    for done, content in enumerate(render_modules(modules, descriptors), 1):
+        files.update(content)
+        if progress:
+            progress(done, len(modules))
+    files.update(render_packages(modules, options.python_root))
+    return files
+
+
+def _is_wanted(name: TypeName, request: Request) -> bool:
+    return request.dependencies or name.package in request.packages or name in request.types
+
+
+def _warnings(sources: Sources, names: Iterable[TypeName]) -> tuple[str, ...]:
+    return tuple(
+        f"{winner.name} is defined differently by {winner.file} and {loser.file}; "
+        f"the first is used, since {winner.origin} comes before {loser.origin}"
+        for winner, loser in sources.shadowed(names)
+    )
+
+
+def _numbering(options: Options, lock_text: str | None) -> Numbering:
+    if options.numbering == SequentialNumbering.name:
+        return SequentialNumbering.from_lock(str(options.lock_file), lock_text)
+    return HashNumbering()
+
+
+def _read_lock(options: Options) -> str | None:
+    if options.numbering != SequentialNumbering.name:
+        return None
+    try:
+        return options.lock_file.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return None
+    except (OSError, UnicodeDecodeError) as error:
+        raise GenerateError(f"cannot read {options.lock_file}: {error}") from None
+
+
+def _fingerprint(
+    request: Request, sources: Sources, options: Options, lock_text: str | None, names: Iterable[TypeName]
+) -> str:
+    """Return a digest of everything that the generated files depend on.
+
+    The closure of a request follows from the text of what is in it and from what else its packages have: as long as
+    these are the same, nothing needs to be parsed.
+    """
+    names = sorted(names)
+    packages = {name.package: sorted(map(str, sources.packages.get(name.package, ()))) for name in names}
+    known = [name for name in names if name in sources.packages.get(name.package, ())]
+    content = {
+        "tool": _tool_digest(),
+        "request": [sorted(request.packages), sorted(map(str, request.types)), request.dependencies],
+        "options": [options.numbering, options.events, options.python_root],
+        "lock": lock_text,
+        "packages": packages,
+        "definitions": {str(name): digest(sources.definition(name).text.encode()) for name in known},
+    }
+    return digest(json.dumps(content).encode())
+
+
+def _tool_digest() -> str:
+    """Return a digest of this program: what it generates may change with any of its files and libraries."""
+    package = Path(__file__).resolve().parent.parent
+    folders = [package / name for name in ("interfaces", "schema", "generate", "templates")]
+    folders.append(package.parent / "templates")
+    files = sorted(file for folder in folders if folder.is_dir() for file in folder.rglob("*.*"))
+    parts = [
+        file.name + digest(file.read_bytes()) for file in files if file.suffix in (".py", ".jinja", ".lark")
+    ]
+    parts += [version(library) for library in ("black", "grpcio-tools", "jinja2")]
+    return digest("".join(parts).encode())

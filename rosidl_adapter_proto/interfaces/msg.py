@@ -1,0 +1,409 @@
+"""Reads `.msg`, `.srv` and `.action` definitions.
+
+The rules are those of ROS 2's own `rosidl_adapter`, its treatment of comments, units and escape sequences included.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from rosidl_adapter_proto.errors import DefinitionError
+from rosidl_adapter_proto.interfaces.model import (
+    EMPTY_STRUCT_FIELD,
+    INTEGER_BITS,
+    Action,
+    ArrayType,
+    BasicType,
+    Constant,
+    Field,
+    FieldType,
+    Location,
+    Message,
+    ScalarValue,
+    SequenceType,
+    Service,
+    StringType,
+    TypeName,
+    Value,
+    ValueType,
+    integer_range,
+    value_type,
+)
+from rosidl_adapter_proto.interfaces.problem import problem
+
+MSG_TO_IDL_TYPE = {
+    "bool": "boolean",
+    "byte": "octet",
+    "char": "uint8",
+    "float32": "float",
+    "float64": "double",
+    **{name: name for name in INTEGER_BITS},
+}
+"""The primitive types of `.msg` and their IDL names; `string` and `wstring` are the same in both."""
+
+_NAME_RULES = {
+    "package": re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*"),
+    "field": re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*"),
+    "message": re.compile(r"[A-Z][A-Za-z0-9]*"),
+    "constant": re.compile(r"[A-Z]([A-Z0-9_]?[A-Z0-9]+)*"),
+}
+_NAME_ADVICE = {
+    "package": "use lower case letters, digits and single underscores, beginning with a letter",
+    "field": "use lower case letters, digits and single underscores, beginning with a letter",
+    "message": "use letters and digits, beginning with an upper case letter",
+    "constant": "use upper case letters, digits and single underscores, beginning with a letter",
+}
+_ROS1_FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+_DERIVED_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
+
+_TYPE = re.compile(r"(?P<element>[^\[\]]*)(\[(?P<upper_bound><=)?(?P<size>[^\[\]]*)\])?")
+_UNIT = re.compile(r"(\s*\[([^,\]]+)\])")  # no comma: [0, 1] is a range
+_ESCAPE = re.compile(r"""\\([ntvbrfa\\?'"]|[0-7]{1,3}|x[0-9a-fA-F]{1,2}|u[0-9a-fA-F]{4})""")
+_SEPARATOR = "---"
+
+
+def parse_msg(text: str, name: TypeName, file: str, *, ros1_names: bool = False) -> Message:
+    """Read a `.msg` definition.
+
+    Args:
+        text: The definition.
+        name: The type that it defines.
+        file: Where it came from, for messages.
+        ros1_names: Whether field names may contain upper case letters, as ROS 1 allows.
+
+    Raises:
+        DefinitionError: ROS 2 would not accept the definition; the message gives file, line and column.
+    """
+    return _MessageReader(text, name, file, ros1_names).read(0, len(text.splitlines()), text)
+
+
+def parse_srv(text: str, name: TypeName, file: str) -> Service:
+    """Read a `.srv` definition; arguments and errors are those of `parse_msg`."""
+    request, response = _parse_sections(text, name, file, ("_Request", "_Response"))
+    return Service(name, request, response, text)
+
+
+def parse_action(text: str, name: TypeName, file: str) -> Action:
+    """Read an `.action` definition; arguments and errors are those of `parse_msg`."""
+    goal, result, feedback = _parse_sections(text, name, file, ("_Goal", "_Result", "_Feedback"))
+    return Action(name, goal, result, feedback, text)
+
+
+def _parse_sections(text: str, name: TypeName, file: str, suffixes: tuple[str, ...]) -> list[Message]:
+    lines = text.splitlines()
+    separators = [index for index, line in enumerate(lines) if line == _SEPARATOR]
+    expected = len(suffixes) - 1
+    if len(separators) != expected:
+        # Point at the first separator too many, or at the end where one is missing.
+        line = separators[expected] + 1 if len(separators) > expected else max(len(lines), 1)
+        parts = ", ".join(suffix[1:].lower() for suffix in suffixes)
+        raise problem(
+            f"expected {expected} line{'s' * (expected > 1)} '{_SEPARATOR}' between {parts}, "
+            f"found {len(separators)}",
+            text,
+            Location(file, line),
+        )
+    starts = [0, *(index + 1 for index in separators)]
+    ends = [*separators, len(lines)]
+    return [
+        _MessageReader(text, name.sibling(suffix), file).read(start, end)
+        for suffix, start, end in zip(suffixes, starts, ends)
+    ]
+
+
+class _MessageReader:
+    """Reads one message out of some lines of a definition."""
+
+    def __init__(self, text: str, name: TypeName, file: str, ros1_names: bool = False) -> None:
+        self.text = text
+        self.name = name
+        self.file = file
+        self.lines = text.splitlines()
+        self.field_name = _ROS1_FIELD_NAME if ros1_names else _NAME_RULES["field"]
+
+    def read(self, start: int, end: int, text: str = "") -> Message:
+        """Read the lines from `start` up to `end`, counted from 0."""
+        for kind, part in (("package", self.name.package), ("message", _without_suffix(self.name.name))):
+            if not _NAME_RULES[kind].fullmatch(part):
+                raise DefinitionError(
+                    f"{self.file}: {part!r} is not a valid {kind} name; {_NAME_ADVICE[kind]}"
+                )
+        message_comment: list[str] = []
+        while start < end and self.lines[start].startswith("#"):
+            message_comment.append(self.lines[start].lstrip("#"))
+            start += 1
+
+        pending: list[str] = []  # comment lines that wait for the element they stand above
+        comments: list[list[str]] = []  # of each element, in order of appearance
+        elements: list[Field | Constant] = []
+        for number, line in enumerate(self.lines[start:end], start + 1):
+            code, mark, comment = line.replace("\t", " ").rstrip().partition("#")
+            indented_comment = bool(mark and code and not code.strip())
+            if indented_comment and comments:
+                comments[-1].append(comment.lstrip("#"))
+                continue
+            if mark:
+                pending.append(comment.lstrip("#"))
+            if not code.strip():
+                continue
+            elements.append(self._element(code, number))
+            comments.append(pending)
+            pending = []
+
+        documented = [
+            replace(element, comment=comment, unit=unit)
+            for element, (comment, unit) in zip(elements, map(_comment_and_unit, comments))
+        ]
+        fields = [element for element in documented if isinstance(element, Field)]
+        constants = [element for element in documented if isinstance(element, Constant)]
+        self._refuse_duplicates(fields)
+        self._refuse_duplicates(constants)
+        if pending:
+            message_comment += ["", *pending]
+        if not fields:
+            fields.append(Field(EMPTY_STRUCT_FIELD, BasicType("uint8")))
+        return Message(self.name, tuple(fields), tuple(constants), _tidy(message_comment), (), text)
+
+    def _element(self, code: str, number: int) -> Field | Constant:
+        """Read a field or constant from a line without its comment."""
+        type_column = len(code) - len(code.lstrip()) + 1
+        type_text, _, rest = code.strip().partition(" ")
+        rest = rest.lstrip()
+        type_location = Location(self.file, number, type_column)
+        if not rest:
+            raise self._problem(f"expected a type and a name, found only {type_text!r}", type_location)
+        name_location = Location(self.file, number, code.index(rest, type_column - 1 + len(type_text)) + 1)
+        if "=" in rest:
+            return self._constant(type_text, rest, type_location, name_location)
+        name, _, default_text = rest.partition(" ")
+        if not self.field_name.fullmatch(name):
+            raise self._bad_name("field", name, name_location)
+        field_type = self._type(type_text, type_location)
+        default_text = default_text.strip()
+        default = None
+        if default_text:
+            column = name_location.column + len(rest) - len(rest[len(name) :].lstrip())
+            default = self._default(field_type, default_text, Location(self.file, number, column))
+        return Field(name, field_type, default, location=name_location)
+
+    def _constant(self, type_text: str, rest: str, type_location: Location, location: Location) -> Constant:
+        name, _, value_text = rest.partition("=")
+        name = name.rstrip()
+        if not _NAME_RULES["constant"].fullmatch(name):
+            raise self._bad_name("constant", name, location)
+        constant_type = self._type(type_text, type_location)
+        if not isinstance(constant_type, (BasicType, StringType)) or "<=" in type_text:
+            raise self._problem(
+                f"a constant cannot be of type {type_text!r}; use a number, bool, string or wstring",
+                type_location,
+            )
+        value_text = value_text.strip()
+        column = location.column + len(rest) - len(rest.partition("=")[2].lstrip())
+        value = self._value(constant_type, value_text, Location(self.file, location.line, column))
+        return Constant(name, constant_type, value, location=location)
+
+    def _type(self, text: str, location: Location) -> FieldType:
+        match = _TYPE.fullmatch(text)
+        if match is None:
+            raise self._problem(f"{text!r} is not a type; arrays have one pair of brackets", location)
+        element = self._value_type(match["element"], location)
+        size_text = match["size"]
+        if size_text is None:
+            return element
+        if not size_text and not match["upper_bound"]:
+            return SequenceType(element)
+        size = self._positive(size_text, f"the size of array type {text!r}", location)
+        return SequenceType(element, size) if match["upper_bound"] else ArrayType(element, size)
+
+    def _value_type(self, text: str, location: Location) -> ValueType:
+        if text in MSG_TO_IDL_TYPE:
+            return BasicType(MSG_TO_IDL_TYPE[text])
+        base, is_bounded, bound_text = text.partition("<=")
+        if base in ("string", "wstring") and (is_bounded or text == base):
+            bound = self._positive(bound_text, f"the bound of {text!r}", location) if is_bounded else None
+            return StringType(base == "wstring", bound)
+        if text in ("time", "duration"):
+            raise self._problem(f"{text!r} is a ROS 1 type; use builtin_interfaces/{text.title()}", location)
+        package, slash, message = text.rpartition("/")
+        package = package if slash else self.name.package
+        if not _NAME_RULES["package"].fullmatch(package):
+            raise self._problem(
+                f"{text!r} is not a type: {package!r} is not a valid package name; {_NAME_ADVICE['package']}",
+                location,
+            )
+        if not _NAME_RULES["message"].fullmatch(_without_suffix(message)):
+            raise self._problem(
+                f"{text!r} is neither a primitive type nor the name of a message; "
+                f"{_NAME_ADVICE['message']}",
+                location,
+            )
+        return TypeName(package, "msg", message)
+
+    def _positive(self, text: str, what: str, location: Location) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = 0
+        if value <= 0:
+            raise self._problem(f"{what} must be a whole number above 0, not {text!r}", location)
+        return value
+
+    def _default(self, field_type: FieldType, text: str, location: Location) -> Value:
+        element = value_type(field_type)
+        if isinstance(element, TypeName):
+            raise self._problem("a field that is a message cannot have a default value", location)
+        if not isinstance(field_type, (ArrayType, SequenceType)):
+            return self._value(element, text, location)
+        if not (text.startswith("[") and text.endswith("]") and len(text) > 1):
+            raise self._problem(f"the default of an array must stand in brackets, not {text!r}", location)
+        inner = text[1:-1]
+        if isinstance(element, StringType):
+            parts = self._split_strings(inner, location)
+        else:
+            parts = [part.strip() for part in inner.split(",")] if inner else []
+        if isinstance(field_type, ArrayType) and len(parts) != field_type.size:
+            raise self._problem(
+                f"the default of an array of {field_type.size} must have {field_type.size} elements, "
+                f"not {len(parts)}",
+                location,
+            )
+        if isinstance(field_type, SequenceType) and field_type.bound and len(parts) > field_type.bound:
+            raise self._problem(
+                f"the default of a sequence of at most {field_type.bound} cannot have {len(parts)} elements",
+                location,
+            )
+        return tuple(self._value(element, part, location) for part in parts)
+
+    def _split_strings(self, text: str, location: Location) -> list[str]:
+        """Split at commas, except inside quotes; the parts keep their quotes."""
+        parts: list[str] = []
+        rest = text.strip(" ")
+        while rest:
+            if rest[0] in "\"'":
+                match = re.match(rf"{rest[0]}(\\.|[^\\{rest[0]}])*{rest[0]}", rest)
+                if match is None:
+                    raise self._problem(f"the string {rest!r} has no closing quote", location)
+                part = match.group()
+            else:
+                part = rest.partition(",")[0].rstrip(" ")
+            if not part:
+                raise self._problem("expected a string before ','", location)
+            parts.append(part)
+            rest = rest[len(part) :].lstrip(" ")
+            if rest and rest[0] != ",":
+                raise self._problem(f"expected ',' between strings, found {rest!r}", location)
+            rest = rest[1:].lstrip(" ")
+        return parts
+
+    def _value(self, scalar: BasicType | StringType, text: str, location: Location) -> ScalarValue:
+        try:
+            if isinstance(scalar, StringType):
+                return _string_value(text, scalar.bound)
+            return _READERS.get(scalar.name, _integer_value)(text, scalar.name)
+        except ValueError as error:
+            raise self._problem(str(error), location) from None
+
+    def _refuse_duplicates(self, elements: Sequence[Field | Constant]) -> None:
+        seen: dict[str, Location | None] = {}
+        for element in elements:
+            if element.name in seen:
+                first = seen[element.name]
+                assert first is not None and element.location is not None
+                raise self._problem(
+                    f"{element.name!r} is defined twice, first in line {first.line}", element.location
+                )
+            seen[element.name] = element.location
+
+    def _bad_name(self, kind: str, name: str, location: Location) -> DefinitionError:
+        return self._problem(f"{name!r} is not a valid {kind} name; {_NAME_ADVICE[kind]}", location)
+
+    def _problem(self, message: str, location: Location) -> DefinitionError:
+        return problem(message, self.text, location)
+
+
+def _without_suffix(name: str) -> str:
+    """Strip what ROS itself appends to the messages of services and actions."""
+    for suffix in _DERIVED_SUFFIXES:
+        name = name.removesuffix(suffix)
+    return name
+
+
+def _boolean_value(text: str, _: str) -> bool:
+    values = {"true": True, "1": True, "false": False, "0": False}
+    if text.lower() not in values:
+        raise ValueError(f"a bool must be true, false, 1 or 0, not {text!r}")
+    return values[text.lower()]
+
+
+def _float_value(text: str, _: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"expected a number with '.' as its decimal point, not {text!r}") from None
+
+
+def _integer_value(text: str, name: str) -> int:
+    lowest, highest = integer_range(name)
+    try:
+        value = int(text)
+    except ValueError:
+        try:
+            value = int(text, 0)
+        except ValueError:
+            raise ValueError(f"expected a whole number from {lowest} to {highest}, not {text!r}") from None
+    if not lowest <= value <= highest:
+        raise ValueError(f"{text} does not fit {name}, which goes from {lowest} to {highest}")
+    return value
+
+
+_READERS: dict[str, Callable[[str, str], ScalarValue]] = {
+    "boolean": _boolean_value,
+    "float": _float_value,
+    "double": _float_value,
+}
+
+
+def _string_value(text: str, bound: int | None) -> str:
+    for quote in "\"'":
+        if text.startswith(quote) and text.endswith(quote):
+            text = text[1:-1]
+            if re.search(rf"(?<!\\){quote}", text):
+                raise ValueError(f"a quote inside a string must be written \\{quote}")
+            text = text.replace(f"\\{quote}", quote)
+            break
+    if bound is not None and len(text) > bound:
+        raise ValueError(f"the string has {len(text)} characters, more than its bound of {bound}")
+    # ROS 2 unescapes twice: once on the way from .msg to .idl, once when it reads the .idl.
+    return _unescape(_unescape(text))
+
+
+def _unescape(text: str) -> str:
+    """Replace the escape sequences of IDL table 7-9."""
+
+    def character(match: re.Match[str]) -> str:
+        return match.group().encode("ascii").decode("unicode_escape") if match[1] != "?" else "?"
+
+    return _ESCAPE.sub(character, text)
+
+
+def _comment_and_unit(lines: list[str]) -> tuple[tuple[str, ...], str | None]:
+    units = _UNIT.findall("\n".join(lines))
+    if len(units) != 1:
+        return _tidy(lines), None
+    marked, unit = units[0]
+    return _tidy([line.replace(marked, "") for line in lines]), unit
+
+
+def _tidy(lines: list[str]) -> tuple[str, ...]:
+    """Drop outer empty lines, fold inner ones, and take away common indentation."""
+    kept: list[str] = []
+    for line in textwrap.dedent("\n".join(lines)).strip("\n").split("\n"):
+        if line.strip() or (kept and kept[-1]):
+            kept.append(line.rstrip())
+    while kept and not kept[-1]:
+        kept.pop()
+    return tuple(kept)
