@@ -10,7 +10,8 @@ import importlib
 import sys
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
-from functools import lru_cache
+from functools import cache
+from math import isfinite
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, NoReturn, TypeVar
 
 from google.protobuf import descriptor_pool
@@ -103,10 +104,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
     """
 
     custom_type: type[CustomT]
-    if TYPE_CHECKING:
-        ros_message_type: type[RosT]
-    else:
-        ros_message_type = _RosClass("ros_message_type")
+    ros_message_type: Any = _RosClass("ros_message_type")
     type_name: ClassVar[str]
     type_hash: ClassVar[str]
     fields: ClassVar[tuple[FieldInfo, ...]]
@@ -115,7 +113,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
     ros_class: ClassVar[str]
 
     @staticmethod
-    def convert_to_ros_message(source: Any, destination: Any = None) -> Any:
+    def convert_to_ros_message(source: CustomT, destination: RosT | None = None) -> RosT:
         """Convert a protobuf message to a ROS message.
 
         Args:
@@ -132,7 +130,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         raise NotImplementedError
 
     @staticmethod
-    def convert_to_custom(source: Any, destination: Any = None) -> Any:
+    def convert_to_custom(source: RosT, destination: CustomT | None = None) -> CustomT:
         """Convert a ROS message to a protobuf message.
 
         Args:
@@ -148,12 +146,12 @@ class TypeAdapter(Generic[CustomT, RosT]):
         raise NotImplementedError
 
     @staticmethod
-    def fill_ros_message(source: Any, message: Any) -> None:
+    def fill_ros_message(source: CustomT, message: RosT) -> None:
         """Fill a newly made ROS message; it is left half filled on an error."""
         raise NotImplementedError
 
     @staticmethod
-    def fill_custom(source: Any, message: Any) -> None:
+    def fill_custom(source: RosT, message: CustomT) -> None:
         """Fill an empty protobuf message; it is left half filled on an error."""
         raise NotImplementedError
 
@@ -290,7 +288,7 @@ def finish_custom(message: CustomT, destination: CustomT | None) -> CustomT:
     return destination
 
 
-def finish_ros_message(message: RosT, destination: RosT | None, adapter: Any) -> RosT:
+def finish_ros_message(message: Any, destination: Any, adapter: type[TypeAdapter[Any, Any]]) -> Any:
     """Return a converted ROS message, or overwrite the fields of the destination with its fields."""
     if destination is None:
         return message
@@ -315,12 +313,9 @@ def in_range(value: int, lowest: int, highest: int) -> int:
 
 def float32(value: float) -> float:
     """Return a number that a float32 can hold."""
-    if -LARGEST_FLOAT32 < value < LARGEST_FLOAT32 or value != value or value in _INFINITIES:
+    if -LARGEST_FLOAT32 < value < LARGEST_FLOAT32 or not isfinite(value):
         return value
     raise ValueError(f"{value} is too large for a float32")
-
-
-_INFINITIES = (float("inf"), float("-inf"))
 
 
 def at_most(values: SizedT, bound: int, what: str = "elements") -> SizedT:
@@ -369,9 +364,7 @@ def string(value: object) -> str:
 
 def boolean(value: Any) -> bool:
     """Return a bool; anything else, other than 0 and 1, is an error."""
-    if value is True or value is False:
-        return bool(value)
-    if value == 0 or value == 1:  # such as numpy.bool_
+    if value is True or value is False or value in (0, 1):  # the latter for numpy.bool_
         return bool(value)
     raise TypeError(f"expected bool, not {value!r}")
 
@@ -468,14 +461,14 @@ def _raise_first_that_does_not_fit(values: Iterable[int], typecode: str) -> NoRe
 
 
 def packed(field_number: int, values: Any) -> bytes:
-    """Return an array as a packed repeated field of fixed-width numbers as it is on the wire (protobuf encoding, "Packed")."""
+    """Return a packed repeated field of fixed-width numbers as it is on the wire (protobuf encoding, "Packed")."""
     data: bytes = values.tobytes()
     if not data:
         return b""
     return b"%b%b%b" % (_length_delimited_tag(field_number), _varint(len(data)), data)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _length_delimited_tag(field_number: int) -> bytes:
     return _varint(field_number << 3 | 2)
 
@@ -490,14 +483,14 @@ def _varint(value: int) -> bytes:
 
 
 def elements(field: Any, typecode: str) -> Any:
-    """Return a repeated number field as an array (`array.array` or numpy) of the C type that `typecode` names in `array`."""
+    """Return a repeated number field as an array (`array.array` or numpy) of the C type of `typecode`."""
     # Newer protobuf runtimes give numpy the whole array at once; for others array.array is faster than numpy.
     if hasattr(field, "__array__") and typecode not in "hH":
         return _numpy().asarray(field, dtype=_NUMPY_TYPES[typecode])
     return numbers(field, typecode)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _numpy() -> Any:
     return importlib.import_module("numpy")
 
@@ -514,12 +507,11 @@ def fill_array(destination: Any, values: Any) -> None:
 
 def fill_each(fill: Callable[[Any, Any], None], values: Iterable[Any], field: Any) -> None:
     """Append a message to a repeated field for each ROS message."""
-    index = 0
     try:
-        for index, value in enumerate(values):
+        for value in values:
             fill(value, field.add())
     except CONVERSION_ERRORS as error:
-        raise conversion_error("", f"[{index}]", error) from None
+        raise conversion_error("", f"[{len(field) - 1}]", error) from None
 
 
 def ros_messages(adapter: type[TypeAdapter[Any, RosT]], values: Sequence[Any]) -> list[RosT]:

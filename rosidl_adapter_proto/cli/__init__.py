@@ -1,11 +1,13 @@
 """The command line, `rosidl-proto`: parses, calls, prints.
 
-Exit codes: 0 done; 1 `--check` found something stale; 2 the command line or its configuration is wrong; 3 the work
-could not be done (a definition, a lock file, the output folder or protoc is at fault); 130 interrupted.
+Exit codes: 0 done; 1 `--check` found something stale, or what reads the output went away; 2 the command line or its
+configuration is wrong; 3 the work could not be done (a definition, a lock file, the output folder or protoc is at
+fault); 130 interrupted.
 """
 
 from __future__ import annotations
 
+import io
 import sys
 import traceback
 
@@ -18,8 +20,6 @@ from rosidl_adapter_proto.cli.list import list_command
 from rosidl_adapter_proto.cli.show import show_command
 from rosidl_adapter_proto.errors import Error
 
-EXIT_STALE = 1
-EXIT_USAGE = 2
 EXIT_FAILED = 3
 EXIT_INTERRUPTED = 130
 
@@ -41,18 +41,27 @@ for command in (generate_command, list_command, show_command, completion_command
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line, and exit."""
-    arguments = sys.argv[1:] if arguments is None else arguments
+    given = sys.argv[1:] if arguments is None else arguments
+    debug = "--debug" in given
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # definitions may have what the terminal's encoding has not
     try:
-        status = program.main(arguments, prog_name="rosidl-proto", standalone_mode=False)
+        # It is taken out, so that it may also stand behind the command.
+        status = program.main(
+            [each for each in given if each != "--debug"], prog_name="rosidl-proto", standalone_mode=False
+        )
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; the output is as it was", err=True)
+        click.echo("interrupted; no half-written output is left", err=True)
         sys.exit(EXIT_INTERRUPTED)
-    except Error as error:
-        if "--debug" in arguments:
+    except Exception as error:
+        if debug:
             traceback.print_exc()
-        click.echo(f"error: {error}", err=True)
+        if isinstance(error, Error):
+            click.echo(f"Error: {error}", err=True)
+        else:
+            click.echo(f"Internal error: {error!r}; --debug shows where it comes from", err=True)
         sys.exit(EXIT_FAILED)
     sys.exit(status or 0)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Any
 
 import click
+
+from rosidl_adapter_proto.cli.options import is_path
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -15,16 +18,18 @@ else:
 
 SECTION = "rosidl-proto"
 
+_NOT_SETTINGS = ("check", "verbose")
+
 
 class ConfiguredGroup(click.Group):
     """A group of commands whose options take their defaults from the configuration."""
 
-    def make_context(
-        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
-    ) -> click.Context:
-        """Give every command the defaults of the configuration."""
-        extra.setdefault("default_map", _default_map(self, find_configuration(Path.cwd())))
-        return super().make_context(info_name, args, parent, **extra)
+    def invoke(self, context: click.Context) -> Any:
+        """Give every command the defaults of the configuration, and run the one that was asked for."""
+        found = find_configuration(Path.cwd())
+        if found is not None:
+            context.default_map = dict.fromkeys(self.commands, _defaults(self, *found))
+        return super().invoke(context)
 
 
 def find_configuration(folder: Path) -> tuple[Path, dict[str, Any]] | None:
@@ -38,61 +43,75 @@ def find_configuration(folder: Path) -> tuple[Path, dict[str, Any]] | None:
         if not file.is_file():
             continue
         try:
-            content = tomllib.loads(file.read_text(encoding="utf-8"))
+            tools = tomllib.loads(file.read_text(encoding="utf-8")).get("tool", {})
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise click.UsageError(f"cannot read {file}: {error}") from None
-        section = content.get("tool", {}).get(SECTION)
-        if section is not None:
-            return file, section
+        if isinstance(tools, dict) and SECTION in tools:
+            if not isinstance(tools[SECTION], dict):
+                raise click.UsageError(f"{file}: [tool.{SECTION}] must be a table")
+            return file, tools[SECTION]
     return None
 
 
-def _default_map(group: click.Group, found: tuple[Path, dict[str, Any]] | None) -> dict[str, Any]:
-    """Return the defaults of each command; a setting is named like the option, or is `packages`."""
-    if found is None:
-        return {}
-    file, section = found
+def _defaults(group: click.Group, file: Path, section: dict[str, Any]) -> dict[str, Any]:
+    """Return the default of each option by the name of its parameter.
+
+    A setting is named like the option; what to generate is `packages`.
+    """
     known = {
         name: parameter
         for command in group.commands.values()
         for parameter in command.params
-        for name in _setting_names(parameter)
+        if (name := _setting_name(parameter))
     }
     values: dict[str, Any] = {}
+    for parameter in known.values():
+        # A path that is not set is beside the configuration too, wherever the program runs.
+        if isinstance(parameter.type, click.Path) and not parameter.multiple and parameter.name:
+            values[parameter.name] = _path(str(parameter.default), file)
     for name, value in section.items():
-        parameter = known.get(name)
-        if parameter is None or parameter.name is None:
+        if name not in known:
             raise click.UsageError(
                 f"{file}: [tool.{SECTION}] has no setting {name!r}; it has {', '.join(sorted(known))}"
             )
-        values[parameter.name] = _value(parameter, name, value, file)
-    return {command: values for command in group.commands}
+        values[str(known[name].name)] = _value(known[name], name, value, file)
+    return values
 
 
-def _setting_names(parameter: click.Parameter) -> list[str]:
+def _setting_name(parameter: click.Parameter) -> str | None:
+    """Return how a parameter is called in the configuration, or None if it is not a setting."""
     if parameter.name in _NOT_SETTINGS:
-        return []
+        return None
     if isinstance(parameter, click.Argument):
-        return ["packages"] if parameter.name == "what" else []
-    return [option.removeprefix("--") for option in parameter.opts if option.startswith("--")]
-
-
-_NOT_SETTINGS = ("check", "verbose", "shell", "help")
+        return "packages" if parameter.nargs == -1 else None
+    return parameter.opts[0].removeprefix("--")
 
 
 def _value(parameter: click.Parameter, name: str, value: Any, file: Path) -> Any:
-    """Return a setting as click takes a default; relative paths are relative to the configuration."""
-    several = parameter.multiple or parameter.nargs == -1
-    if several != isinstance(value, list):
-        raise click.UsageError(f"{file}: [tool.{SECTION}] {name} must {'' if several else 'not '}be a list")
-    if isinstance(parameter.type, click.Path):
-        if several:
-            return [str(file.parent / each) for each in value]
-        return str(file.parent / value)
-    if name == "packages":
-        return [str(file.parent / each) if _looks_like_path(each) else each for each in value]
-    return value
+    """Return a setting as click takes a default; relative paths are relative to the configuration.
+
+    Raises:
+        click.UsageError: It is not of the type that the parameter has.
+    """
+    place = f"{file}: [tool.{SECTION}] {name}"
+    if parameter.multiple or parameter.nargs == -1:
+        if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+            raise click.UsageError(f"{place} must be a list of strings")
+        is_paths = isinstance(parameter.type, click.Path)
+        return [_path(each, file) if is_paths or is_path(each) else each for each in value]
+    if isinstance(parameter, click.Option) and parameter.is_flag:
+        if not isinstance(value, bool):
+            raise click.UsageError(f"{place} must be true or false")
+        return value
+    if not isinstance(value, str):
+        raise click.UsageError(f"{place} must be a string")
+    if isinstance(parameter.type, click.Choice) and value not in parameter.type.choices:
+        choices = " or ".join(map(repr, parameter.type.choices))
+        raise click.UsageError(f"{place} must be {choices}, not {value!r}")
+    return _path(value, file) if isinstance(parameter.type, click.Path) else value
 
 
-def _looks_like_path(text: str) -> bool:
-    return text.startswith((".", "/")) or text.endswith((".msg", ".srv", ".action", ".idl"))
+def _path(text: str, file: Path) -> str:
+    """Return a path that is relative to the configuration as one that is relative to the current folder."""
+    path = os.path.relpath(file.parent / text)
+    return str(file.parent / text) if path.startswith("..") else os.path.join(".", path)

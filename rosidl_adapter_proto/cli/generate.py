@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_package, find_request, source_options
-from rosidl_adapter_proto.generate import Options, Result, generate
-from rosidl_adapter_proto.generate.layout import Changes
-from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering, SequentialNumbering
+from rosidl_adapter_proto.cli.options import complete_name, find_request, schema_options, source_options
+from rosidl_adapter_proto.generate import Options, Progress, Result, generate
 
 
 @click.command("generate")
-@click.argument("what", nargs=-1, required=True, metavar="WHAT...", shell_complete=complete_package)
+@click.argument("what", nargs=-1, required=True, metavar="WHAT...", shell_complete=complete_name)
 @click.option(
     "--output",
     "-o",
@@ -25,21 +25,7 @@ from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering,
     help="The folder to write. It holds what the last run made, and nothing older.",
 )
 @click.option("--deps/--no-deps", default=True, help="Generate the packages that WHAT depends on, too.")
-@click.option(
-    "--numbering",
-    type=click.Choice([HashNumbering.name, SequentialNumbering.name]),
-    default=HashNumbering.name,
-    show_default=True,
-    help="How fields are numbered: from a hash of their names, or in sequence with a lock file.",
-)
-@click.option(
-    "--lock-file",
-    type=click.Path(path_type=Path),
-    default=Path(LOCK_FILE_NAME),
-    show_default=True,
-    help="Where sequential numbers are kept; commit it.",
-)
-@click.option("--events", is_flag=True, help="Include the _Event messages of service introspection.")
+@schema_options
 @click.option(
     "--python-root",
     default="rosidl_proto",
@@ -70,45 +56,55 @@ def generate_command(
     """
     request, sources = find_request(what, include, distro, deps)
     options = Options(numbering, lock_file, events, python_root)
-    with click.progressbar(
-        length=1, label="generating", hidden=not sys.stderr.isatty(), file=sys.stderr
-    ) as bar:
-
-        def progress(done: int, total: int) -> None:
-            bar.length = total
-            bar.update(done - bar.pos)
-
+    with _progress() as progress:
         result = generate(request, sources, output, options, check=check, progress=progress)
     for warning in result.warnings:
-        click.echo(f"warning: {warning}", err=True)
+        click.echo(f"Warning: {warning}", err=True)
     if verbose:
         for name in result.interfaces:
             click.echo(f"{name} from {sources.definition(name).file}")
     if check:
         return _report_check(result, output, lock_file)
-    _report(result, output, verbose)
+    if verbose:
+        _list_files(result, output, lock_file, "wrote", "removed")
+    changes = result.changes
+    counts = f"{len(changes.written)} written, {len(changes.removed)} removed, {changes.unchanged} unchanged"
+    click.echo(f"{output}: {len(result.interfaces)} interfaces, files: {counts}")
     return 0
 
 
-def _report(result: Result, output: Path, verbose: bool) -> None:
-    if verbose:
-        _list_files(result.changes, output)
-    changes = result.changes
-    counts = f"{len(changes.written)} written, {len(changes.removed)} removed, {changes.unchanged} unchanged"
-    click.echo(f"{output}: {len(result.interfaces)} interfaces, {counts}")
+@contextlib.contextmanager
+def _progress() -> Iterator[Progress | None]:
+    """Show progress on a terminal, once there is some."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    with contextlib.ExitStack() as stack:
+        bar: Any = None
+
+        def show(done: int, total: int) -> None:
+            nonlocal bar
+            if bar is None:
+                bar = stack.enter_context(
+                    click.progressbar(length=total, label="generating", file=sys.stderr)
+                )
+            bar.update(done - bar.pos)
+
+        yield show
 
 
 def _report_check(result: Result, output: Path, lock_file: Path) -> int:
     if not result.is_stale:
         click.echo(f"{output} is up to date")
         return 0
-    _list_files(result.changes, output)
-    if result.lock_changed:
-        click.echo(f"would write {lock_file}")
+    _list_files(result, output, lock_file, "would write", "would remove")
     return 1
 
 
-def _list_files(changes: Changes, output: Path) -> None:
-    for verb, paths in (("write", changes.written), ("remove", changes.removed)):
-        for path in paths:
-            click.echo(f"{verb} {output / path}")
+def _list_files(result: Result, output: Path, lock_file: Path, wrote: str, removed: str) -> None:
+    for path in result.changes.written:
+        click.echo(f"{wrote} {output / path}")
+    for path in result.changes.removed:
+        click.echo(f"{removed} {output / path}")
+    if result.lock_changed:
+        click.echo(f"{wrote} {lock_file}")

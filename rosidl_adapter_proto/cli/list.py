@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_package, find_sources, source_options
+from rosidl_adapter_proto.cli.options import complete_name, find_sources, source_options
 
 
 @click.command("list")
-@click.argument("package", required=False, shell_complete=complete_package)
+@click.argument("package", required=False, shell_complete=complete_name)
 @source_options
 def list_command(package: str | None, include: tuple[Path, ...], distro: str | None) -> None:
     """List the packages that are found and where, or the interfaces of one PACKAGE."""

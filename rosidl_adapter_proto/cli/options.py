@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
+from rosidl_adapter_proto.errors import Error
 from rosidl_adapter_proto.generate import Request
 from rosidl_adapter_proto.interfaces import store
 from rosidl_adapter_proto.interfaces.model import TypeName
@@ -20,24 +21,65 @@ from rosidl_adapter_proto.interfaces.sources import (
     prefix_sources,
     store_source,
 )
+from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering, SequentialNumbering
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def complete_distro(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Return the distributions that begin with what was typed."""
+    return [name for name in store.distributions() if name.startswith(incomplete)]
+
+
+def complete_name(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Return the packages, or behind a slash the types of one, that begin with what was typed."""
+    try:
+        sources = find_sources(context.params.get("include") or (), context.params.get("distro"))
+    except (Error, click.UsageError):
+        return []
+    package, slash, _ = incomplete.partition("/")
+    names = map(str, sources.packages.get(package, ())) if slash else sources.packages
+    return sorted(name for name in names if name.startswith(incomplete))
 
 
 def source_options(command: Command) -> Command:
     """Add the options that say where definitions come from."""
     command = click.option(
+        "--distro",
+        metavar="NAME",
+        shell_complete=complete_distro,
+        help="The ROS distribution whose embedded definitions stand in for packages found nowhere else "
+        "(default: $ROS_DISTRO, else the newest).",
+    )(command)
+    return click.option(
         "--include",
         "-I",
         type=click.Path(path_type=Path),
         multiple=True,
         help="A package folder, or a folder of packages, to find definitions in. May be repeated.",
     )(command)
+
+
+def schema_options(command: Command) -> Command:
+    """Add the options that say how the `.proto` files are made."""
+    command = click.option(
+        "--events/--no-events",
+        default=False,
+        help="Include the _Event messages of service introspection.",
+    )(command)
+    command = click.option(
+        "--lock-file",
+        type=click.Path(path_type=Path),
+        default=Path(LOCK_FILE_NAME),
+        show_default=True,
+        help="Where sequential numbers are kept; commit it.",
+    )(command)
     return click.option(
-        "--distro",
-        metavar="NAME",
-        help="The ROS distribution whose embedded definitions stand in for packages found nowhere else "
-        "(default: $ROS_DISTRO, else the newest).",
+        "--numbering",
+        type=click.Choice([HashNumbering.name, SequentialNumbering.name]),
+        default=HashNumbering.name,
+        show_default=True,
+        help="How fields are numbered: from a hash of their names, or in sequence with a lock file.",
     )(command)
 
 
@@ -68,7 +110,7 @@ def find_request(
             source, name = file_source(_existing(path))
             given.append(source)
             types.append(name)
-        elif text.startswith((".", "/")) or "\\" in text or text.endswith("/"):
+        elif is_path(text):
             source = folder_source(_existing(path))
             given.append(source)
             packages += source.packages
@@ -88,6 +130,11 @@ def find_request(
     return Request(tuple(packages), tuple(types), dependencies), sources
 
 
+def is_path(text: str) -> bool:
+    """Tell whether an argument can only be a file or folder; `std_msgs` may be a folder or a package."""
+    return text.startswith((".", "/")) or text.endswith(("/", *SUFFIXES)) or "\\" in text
+
+
 def _merged(given: Iterable[Source]) -> list[Source]:
     """Join the files of one package that were named one by one."""
     merged: list[Source] = []
@@ -95,8 +142,9 @@ def _merged(given: Iterable[Source]) -> list[Source]:
         if merged and set(merged[-1].packages) == set(source.packages):
             last = merged.pop()
             packages = {name: {**source.packages[name], **last.packages[name]} for name in source.packages}
-            source = Source(last.origin, packages)
-        merged.append(source)
+            merged.append(Source(last.origin, packages))
+        else:
+            merged.append(source)
     return merged
 
 
@@ -104,14 +152,3 @@ def _existing(path: Path) -> Path:
     if not path.exists():
         raise click.UsageError(f"there is no file or folder {path}")
     return path
-
-
-def complete_package(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Return the packages that begin with what was typed."""
-    sources = find_sources((), None)
-    return sorted(name for name in sources.packages if name.startswith(incomplete))
-
-
-def complete_distro(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
-    """Return the distributions that begin with what was typed."""
-    return [name for name in store.distributions() if name.startswith(incomplete)]

@@ -7,19 +7,26 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_package, find_sources, source_options
+from rosidl_adapter_proto.cli.options import complete_name, find_sources, schema_options, source_options
 from rosidl_adapter_proto.generate import Options, proto_text
 
 
 @click.command("show")
-@click.argument("type_name", metavar="TYPE", shell_complete=complete_package)
-@click.option("--events", is_flag=True, help="Include the _Event messages of service introspection.")
+@click.argument("type_name", metavar="TYPE", shell_complete=complete_name)
+@schema_options
 @source_options
-def show_command(type_name: str, events: bool, include: tuple[Path, ...], distro: str | None) -> None:
+def show_command(
+    type_name: str,
+    numbering: str,
+    lock_file: Path,
+    events: bool,
+    include: tuple[Path, ...],
+    distro: str | None,
+) -> None:
     """Show the definition of TYPE (std_msgs/msg/String) and the .proto made of it, side by side."""
     sources = find_sources(include, distro)
     definition = sources.definition(sources.full_name(type_name))
-    proto = proto_text(definition.name, sources, Options(events=events))
+    proto = proto_text(definition.name, sources, Options(numbering, lock_file, events))
     click.echo(f"{definition.name} from {definition.file}")
     click.echo(f"type hash {sources.hash(definition.name)}\n")
     left = definition.text.expandtabs(4).splitlines()

@@ -12,8 +12,10 @@ from pathlib import Path
 from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate.layout import (
     Changes,
+    alone_in,
     changes,
     check_ours,
+    discard_left_over,
     make_manifest,
     replace_file,
     write,
@@ -115,24 +117,25 @@ def generate(
     lock_text = _read_lock(options)
     old = read_manifest(output)
     if old is not None and is_intact(output, old):
-        names = [TypeName.parse(name) for name in old.interfaces]
-        if old.fingerprint == _fingerprint(request, sources, options, lock_text, names):
+        fingerprint = _fingerprint(request, sources, options, lock_text, old.interfaces)
+        if fingerprint == old.fingerprint:
+            if not check:
+                discard_left_over(output)
             unchanged = Changes((), (), len(old.outputs))
-            return Result(tuple(names), unchanged, False, _warnings(sources, names))
+            return Result(old.interfaces, unchanged, False, _warnings(sources, old.interfaces))
 
     names = closure(sources, request.packages, request.types, events=options.events)
     numbering = _numbering(options, lock_text)
     files = _generate_files(names, request, sources, options, numbering, progress)
     new_lock_text = numbering.lock_text() if isinstance(numbering, SequentialNumbering) else lock_text
     fingerprint = _fingerprint(request, sources, options, new_lock_text, names)
-    manifest = make_manifest(fingerprint, map(str, names), files)
-    planned = changes(output, manifest, files)
+    changed = changes(output, files)
     if not check:
-        if planned.any:
-            write(output, manifest, files, planned)
+        # The lock file comes first: numbers that nothing uses yet do no harm, but used ones that are not kept do.
         if new_lock_text is not None and new_lock_text != lock_text:
-            replace_file(options.lock_file, new_lock_text.encode())
-    return Result(tuple(names), planned, new_lock_text != lock_text, _warnings(sources, names))
+            _write_lock(options, lock_text, new_lock_text)
+        changed = write(output, make_manifest(fingerprint, names, files), files)
+    return Result(tuple(names), changed, new_lock_text != lock_text, _warnings(sources, names))
 
 
 def proto_text(name: TypeName, sources: Sources, options: Options = Options()) -> str:
@@ -215,6 +218,16 @@ def _read_lock(options: Options) -> str | None:
         return None
     except (OSError, UnicodeDecodeError) as error:
         raise GenerateError(f"cannot read {options.lock_file}: {error}") from None
+
+
+def _write_lock(options: Options, old_text: str | None, new_text: str) -> None:
+    try:
+        with alone_in(options.lock_file.parent):
+            if _read_lock(options) != old_text:
+                raise GenerateError(f"another run has changed {options.lock_file}; run this one again")
+            replace_file(options.lock_file, new_text.encode())
+    except OSError as error:
+        raise GenerateError(f"cannot write {options.lock_file}: {error.strerror}") from error
 
 
 def _fingerprint(

@@ -1,14 +1,19 @@
 """Writes an output folder, so that it holds what one run makes and nothing older.
 
-A manifest in the folder knows every file that was made. Files are staged first and then moved into place, so that a
-full disk or an interrupt leaves the old output as it was.
+A manifest in the folder knows every file that was made. New files are staged in a folder of their own and then moved
+into place, so that a full disk or an interrupt leaves the old output as it was. While files are moved, the manifest
+names both the old and the new ones and has no fingerprint: if the program is killed there, the next run knows which
+files are its own, and makes the rest.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import shutil
 import signal
+import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -17,8 +22,13 @@ from types import FrameType
 
 from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, digest, read_manifest
+from rosidl_adapter_proto.interfaces.model import TypeName
 
-_STAGED_SUFFIX = ".rosidl-proto-new"
+if sys.platform != "win32":
+    import fcntl
+
+STAGING_NAME = ".rosidl-proto-new"
+"""The folder, inside the output folder, that files are staged in. One that outlives its run is left over."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +51,37 @@ class Changes:
         return bool(self.written or self.removed)
 
 
-def changes(output: Path, manifest: Manifest, files: Mapping[str, bytes]) -> Changes:
-    """Return what has to be done so that the folder holds `files`.
+def check_ours(output: Path) -> None:
+    """Check that a folder is empty or was made by us.
 
     Raises:
-        GenerateError: The folder is not one of ours, or holds a file of somebody else in the place of one of ours.
+        GenerateError: It is neither.
     """
-    check_ours(output)
+    try:
+        present = {each.name for each in output.iterdir()} - {STAGING_NAME} if output.exists() else set()
+    except NotADirectoryError:
+        raise GenerateError(f"{output} is not a folder; choose another with --output") from None
+    except OSError as error:
+        raise GenerateError(f"cannot read {output}: {error.strerror}") from None
+    if present and read_manifest(output) is None:
+        raise GenerateError(
+            f"{output} has files that were not made by rosidl-proto; choose an empty or new folder with --output"
+        )
+
+
+def make_manifest(fingerprint: str, interfaces: Iterable[TypeName], files: Mapping[str, bytes]) -> Manifest:
+    """Return the manifest of a folder that holds `files`."""
+    return Manifest(
+        fingerprint, tuple(interfaces), {path: digest(content) for path, content in sorted(files.items())}
+    )
+
+
+def changes(output: Path, files: Mapping[str, bytes]) -> Changes:
+    """Return what has to be done so that a folder holds `files`.
+
+    Raises:
+        GenerateError: It has a file of somebody else in the place of one of ours.
+    """
     old = read_manifest(output)
     made = old.outputs if old else {}
     written = []
@@ -56,114 +90,156 @@ def changes(output: Path, manifest: Manifest, files: Mapping[str, bytes]) -> Cha
         if present == content:
             continue
         if present is not None and path not in made:
-            raise GenerateError(
-                f"{output / path} was not made by rosidl-proto; move it away or choose another folder with --output"
-            )
+            raise _not_ours(output / path)
         written.append(path)
-    removed = [path for path in made if path not in files and (output / path).exists()]
-    if not written and not removed and old != manifest:
-        written.append(MANIFEST_NAME)
+    removed = [path for path in made if path not in files and _is_file(output / path)]
     return Changes(tuple(written), tuple(removed), len(files) - len(written))
 
 
-def check_ours(output: Path) -> None:
-    """Check that a folder is empty or was made by us.
+def write(output: Path, manifest: Manifest, files: Mapping[str, bytes]) -> Changes:
+    """Make a folder hold `files`, and return what that changed.
 
     Raises:
-        GenerateError: It is neither.
+        GenerateError: A file of somebody else is in the way, or a file cannot be written.
     """
-    if not output.exists():
-        return
-    if not output.is_dir():
-        raise GenerateError(f"{output} is not a folder; choose another with --output")
-    if read_manifest(output) is None and any(output.iterdir()):
-        raise GenerateError(
-            f"{output} has files that were not made by rosidl-proto; choose an empty or new folder with --output"
-        )
-
-
-def write(output: Path, manifest: Manifest, files: Mapping[str, bytes], planned: Changes) -> None:
-    """Carry out `planned`.
-
-    Raises:
-        GenerateError: A file cannot be written; the folder is as it was.
-    """
-    contents = {path: files[path] for path in planned.written if path in files}
-    contents[MANIFEST_NAME] = manifest.to_json()
-    staged: list[Path] = []
-    new_folders: list[Path] = []
     try:
-        for path, content in contents.items():
-            target = output / path
-            new_folders += _make_folder(target.parent)
-            staged.append(target.with_name(target.name + _STAGED_SUFFIX))
-            staged[-1].write_bytes(content)
-    except BaseException as error:
-        for file in staged:
-            with contextlib.suppress(OSError):
-                file.unlink()
-        for folder in reversed(new_folders):
-            with contextlib.suppress(OSError):
-                folder.rmdir()
-        if isinstance(error, OSError):
-            raise GenerateError(
-                f"cannot write to {output}: {error.strerror} ({error.filename}); nothing was changed"
-            ) from error
-        raise
-    with _interrupts_deferred():
-        for file in staged:  # the manifest comes last
-            os.replace(file, file.with_name(file.name.removesuffix(_STAGED_SUFFIX)))
-        for path in planned.removed:
-            _remove(output, path)
+        with contextlib.ExitStack() as cleanup:
+            _make_folder(output, cleanup)
+            cleanup.enter_context(alone_in(output))
+            staging = output / STAGING_NAME
+            _remove_folder(staging)
+            cleanup.callback(_remove_folder, staging)
+            planned = changes(output, files)
+            old = read_manifest(output)
+            if not planned.any and old == manifest:
+                return planned
+            for folder in sorted({(output / path).parent for path in (*planned.written, *planned.removed)}):
+                _make_folder(folder, cleanup)
+                if not os.access(folder, os.W_OK):
+                    raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
+            both = Manifest("", (), {**(old.outputs if old else {}), **manifest.outputs})
+            moves = [(MANIFEST_NAME, both.to_json())]
+            moves += [(path, files[path]) for path in planned.written]
+            moves += [(MANIFEST_NAME, manifest.to_json())]
+            staging.mkdir()
+            for number, (_, content) in enumerate(moves):
+                (staging / str(number)).write_bytes(content)
+            with _interrupts_deferred():
+                _move(staging, output, [path for path, _ in moves], planned.removed)
+            return planned
+    except OSError as error:
+        place = f" ({error.filename})" if error.filename else ""
+        raise GenerateError(
+            f"cannot write to {output}: {error.strerror}{place}; nothing was changed"
+        ) from error
+
+
+def discard_left_over(output: Path) -> None:
+    """Remove what a run that was killed had staged; what a run in progress has staged stays."""
+    if (output / STAGING_NAME).exists():
+        with contextlib.suppress(OSError), alone_in(output):
+            _remove_folder(output / STAGING_NAME)
 
 
 def replace_file(file: Path, content: bytes) -> None:
     """Write a single file, all of it or not at all.
 
     Raises:
-        GenerateError: It cannot be written.
+        OSError: It cannot be written.
     """
-    staged = file.with_name(file.name + _STAGED_SUFFIX)
+    target = file.resolve()  # a symbolic link stays one
+    staged = target.with_name(target.name + STAGING_NAME)
     try:
         staged.write_bytes(content)
-        os.replace(staged, file)
-    except OSError as error:
+        staged.replace(target)
+    finally:
         staged.unlink(missing_ok=True)
-        raise GenerateError(f"cannot write {file}: {error.strerror}") from error
 
 
-def make_manifest(fingerprint: str, interfaces: Iterable[str], files: Mapping[str, bytes]) -> Manifest:
-    """Return the manifest of a folder that holds `files`."""
-    return Manifest(
-        fingerprint, tuple(interfaces), {path: digest(content) for path, content in sorted(files.items())}
-    )
+@contextlib.contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Wait until no other run holds `folder`, and let others wait.
+
+    Raises:
+        OSError: The folder cannot be opened.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _move(staging: Path, output: Path, paths: list[str], removed: Iterable[str]) -> None:
+    """Move each staged file to its path; the last is the manifest, which tells that all the others are there."""
+    last = len(paths) - 1
+    try:
+        for number, path in enumerate(paths[:last]):
+            (staging / str(number)).replace(output / path)
+        for path in removed:
+            _remove(output, path)
+        (staging / str(last)).replace(output / paths[last])
+    except OSError as error:
+        raise GenerateError(
+            f"cannot write all of {output}: {error.strerror} ({error.filename}); "
+            "some files are new and some are old: run rosidl-proto again"
+        ) from error
 
 
 def _read(file: Path) -> bytes | None:
+    """Return the content of a file, or None if nothing is there."""
     try:
         return file.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
+        if file.is_symlink():
+            raise _not_ours(file) from None
         return None
+    except IsADirectoryError:
+        raise _not_ours(file) from None
     except OSError as error:
         raise GenerateError(f"cannot read {file}: {error.strerror}") from None
 
 
-def _make_folder(folder: Path) -> list[Path]:
-    """Make a folder and those above it, and return the ones that are new, outermost first."""
-    new = [each for each in (folder, *folder.parents) if not each.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    return new[::-1]
+def _is_file(file: Path) -> bool:
+    return file.is_file() or file.is_symlink()
+
+
+def _not_ours(file: Path) -> GenerateError:
+    return GenerateError(
+        f"{file} was not made by rosidl-proto; move it away, or choose another folder with --output"
+    )
+
+
+def _make_folder(folder: Path, cleanup: contextlib.ExitStack) -> None:
+    """Make a folder and those above it; `cleanup` removes those of them that are still empty."""
+    for each in reversed([each for each in (folder, *folder.parents) if not each.exists()]):
+        cleanup.callback(_remove_empty, each)
+        each.mkdir(exist_ok=True)
+
+
+def _remove_empty(folder: Path) -> bool:
+    """Remove a folder if it is empty, and tell whether it was."""
+    try:
+        folder.rmdir()
+    except OSError:
+        return False
+    return True
+
+
+def _remove_folder(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _remove(output: Path, path: str) -> None:
-    with contextlib.suppress(FileNotFoundError):
-        (output / path).unlink()
+    """Remove a file, and the folders that are empty without it."""
+    (output / path).unlink(missing_ok=True)
     for folder in (output / path).parents:
-        if folder == output:
-            break
-        try:
-            folder.rmdir()
-        except OSError:  # not empty
+        if folder == output or not _remove_empty(folder):
             break
 
 
@@ -180,4 +256,4 @@ def _interrupts_deferred() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGINT, previous)
     if received:
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)

@@ -7,8 +7,10 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from rosidl_adapter_proto.errors import GenerateError
+from rosidl_adapter_proto.interfaces.model import TypeName
 
 MANIFEST_NAME = ".rosidl-proto.json"
 _VERSION = 1
@@ -20,12 +22,12 @@ class Manifest:
 
     Attributes:
         fingerprint: A digest of everything that the files depend on.
-        interfaces: The names of the interfaces they were made from, dependencies included.
+        interfaces: The interfaces they were made from, dependencies included.
         outputs: The digest of each file, by its path relative to the folder.
     """
 
     fingerprint: str
-    interfaces: tuple[str, ...]
+    interfaces: tuple[TypeName, ...]
     outputs: Mapping[str, str]
 
     def to_json(self) -> bytes:
@@ -33,7 +35,7 @@ class Manifest:
         content = {
             "version": _VERSION,
             "fingerprint": self.fingerprint,
-            "interfaces": list(self.interfaces),
+            "interfaces": list(map(str, self.interfaces)),
             "outputs": dict(self.outputs),
         }
         return (json.dumps(content, indent=1) + "\n").encode()
@@ -43,30 +45,31 @@ def read_manifest(output: Path) -> Manifest | None:
     """Return the manifest of a folder, or None if it has none.
 
     Raises:
-        GenerateError: The manifest is damaged, or names files outside the folder.
+        GenerateError: The manifest is damaged, of another version, or names files outside the folder.
     """
     file = output / MANIFEST_NAME
     try:
-        content = json.loads(file.read_bytes())
-        if content["version"] != _VERSION:
-            raise ValueError(f"version {content['version']}")
-        manifest = Manifest(
-            str(content["fingerprint"]), tuple(content["interfaces"]), dict(content["outputs"])
-        )
+        return _parse(json.loads(file.read_bytes()))
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         raise GenerateError(f"cannot read {file}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise GenerateError(
             f"{file} is not a manifest that this version of rosidl-proto reads ({error}); "
             f"remove {output} and generate it again"
         ) from None
-    for path in manifest.outputs:
+
+
+def _parse(content: Any) -> Manifest:
+    if content["version"] != _VERSION:
+        raise ValueError(f"it has version {content['version']}, not {_VERSION}")
+    outputs = dict(content["outputs"])
+    for path in outputs:
         parts = PurePosixPath(path)
-        if parts.is_absolute() or ".." in parts.parts:
-            raise GenerateError(f"{file} names {path!r}, which is not inside {output}; remove the folder")
-    return manifest
+        if not parts.parts or parts.is_absolute() or ".." in parts.parts:
+            raise ValueError(f"it names {path!r}, which is not inside the folder")
+    return Manifest(content["fingerprint"], tuple(map(TypeName.parse, content["interfaces"])), outputs)
 
 
 def is_intact(output: Path, manifest: Manifest) -> bool:

@@ -44,9 +44,16 @@ def compile_protos(protos: Mapping[str, str], wanted: Iterable[str]) -> dict[str
         arguments.write_text(
             "\n".join([f"--proto_path={root}", f"--descriptor_set_out={output}", *wanted]), encoding="utf-8"
         )
-        process = subprocess.run([*_PROTOC, f"@{arguments}"], capture_output=True, text=True, check=False)
+        try:
+            # It runs in a folder of its own: `python -m` would find modules in the current one first.
+            process = subprocess.run(
+                [*_PROTOC, f"@{arguments}"], cwd=folder, capture_output=True, check=False
+            )
+        except OSError as error:
+            raise GenerateError(f"cannot run protoc: {error}") from error
         if process.returncode != 0:
-            said = process.stderr.strip() or process.stdout.strip()
+            said = (process.stderr.strip() or process.stdout.strip()).decode(errors="replace")
+            said = said.replace(f"{root}/", "")
             raise GenerateError(f"protoc failed with exit code {process.returncode}:\n{said}")
         files = FileDescriptorSet.FromString(output.read_bytes()).file
     return {file.name: _without_json_names(file).SerializeToString(deterministic=True) for file in files}

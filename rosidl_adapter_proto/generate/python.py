@@ -8,6 +8,7 @@ Python at a time; the templates only put the lines into place.
 from __future__ import annotations
 
 import keyword
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -19,7 +20,6 @@ from rosidl_adapter_proto.interfaces.model import (
     Action,
     ArrayType,
     BasicType,
-    Field,
     FieldType,
     Interface,
     Message,
@@ -194,8 +194,8 @@ class PythonModules:
         """Every public name and the module, relative to the package, that has it."""
         adapters = [each.class_name for each in self.messages] + [each.class_name for each in self.groups]
         return {
-            **{name: f"{self.name}_pb2" for name in self.custom_names},
-            **{name: f"{self.name}_adapter" for name in adapters},
+            **dict.fromkeys(self.custom_names, f"{self.name}_pb2"),
+            **dict.fromkeys(adapters, f"{self.name}_adapter"),
         }
 
 
@@ -498,18 +498,10 @@ def _each(convert: str, values: str) -> str:
 def _scalar(element: BasicType | StringType) -> tuple[str, str]:
     """Return how one value is converted, to protobuf and to ROS, with `{}` for the value."""
     if isinstance(element, StringType):
-        if element.wide:
-            bounded = "text({}, %d)" % element.bound if element.bound else "{}"
-            ros = "ros_wide({})"
-            return (
-                f"wide({bounded})",
-                f"text({ros}, {element.bound})" if element.bound else ros,
-            )
-        return (
-            ("text(string({}), %d)" % element.bound, "text({}, %d)" % element.bound)
-            if element.bound
-            else ("string({})", "{}")
-        )
+        to_custom, to_ros = ("wide({})", "ros_wide({})") if element.wide else ("string({})", "{}")
+        if element.bound is None:
+            return to_custom, to_ros
+        return to_custom.format(f"text({{}}, {element.bound})"), f"text({to_ros}, {element.bound})"
     if element.name in _NARROW_INTEGERS:
         lowest, highest = integer_range(element.name)
         check = f"in_range({{}}, {lowest}, {highest})"
@@ -571,17 +563,15 @@ def _proto_literal(field_type: FieldType, value: Value) -> str:
         if isinstance(element, BasicType) and element.name in ("octet", "uint8", "int8"):
             return repr(bytes(int(each) & 0xFF for each in value))
         if isinstance(element, BasicType) and element.name in _LARGEST_CHARACTER:
-            return repr("".join(map(str, value)))
+            return repr("".join(chr(int(each)) for each in value))
         return "[" + ", ".join(_proto_literal(element, each) for each in value) + "]"
     if isinstance(element, StringType) and element.wide:
         return repr(str(value).encode("utf-16-le"))
-    if isinstance(element, BasicType) and element.name in _LARGEST_CHARACTER:
-        return repr(ord(str(value)))
     return _python_literal(value)
 
 
 def _python_literal(value: Value) -> str:
-    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+    if isinstance(value, float) and not math.isfinite(value):
         return f'float("{value}")'
     return repr(value)
 

@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate.python import PythonModules
 
 
-@lru_cache(maxsize=None)
+@cache
 def templates_folder() -> Path:
     """Return the folder of the templates: in the installed package, or at the top of a checkout."""
     package = Path(__file__).resolve().parent.parent
@@ -28,7 +28,7 @@ def templates_folder() -> Path:
     raise GenerateError(f"the templates are missing from {package}; install rosidl-adapter-proto again")
 
 
-@lru_cache(maxsize=None)
+@cache
 def _environment() -> jinja2.Environment:
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(templates_folder()),

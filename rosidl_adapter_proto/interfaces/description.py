@@ -12,7 +12,6 @@ from collections.abc import Callable
 from typing import TypedDict
 
 from rosidl_adapter_proto.interfaces.model import (
-    Action,
     ArrayType,
     BasicType,
     Field,

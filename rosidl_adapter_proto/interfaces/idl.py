@@ -714,7 +714,7 @@ def _fitted(value: object, type: ValueType) -> ScalarValue:
         raise _Mistake(f"{_shown(value)} is not a number")
     if type.name in FLOATING_POINT_TYPES:
         return _fitted_float(value)
-    low, high = (0, 0xFFFF) if type.name == "wchar" else integer_range(type.name)
+    low, high = integer_range(type.name)
     if not isinstance(value, int) or not low <= value <= high:
         raise _Mistake(f"{_shown(value)} does not fit {type.name}: use a whole number from {low} to {high}")
     return value

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Union
 
 INTEGER_BITS = {f"{sign}int{bits}": bits for sign in ("", "u") for bits in (8, 16, 32, 64)}
 """The integer types and their width in bits."""
@@ -27,8 +26,8 @@ EMPTY_STRUCT_FIELD = "structure_needs_at_least_one_member"
 
 
 def integer_range(name: str) -> tuple[int, int]:
-    """Return the smallest and the largest value of the integer type `name`, `octet` included."""
-    bits = INTEGER_BITS.get(name, 8)
+    """Return the smallest and the largest value of an integer type, or of `octet`, `char` or `wchar` as a number."""
+    bits = {"octet": 8, "char": 8, "wchar": 16, **INTEGER_BITS}[name]
     if name.startswith("int"):
         return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
     return 0, (1 << bits) - 1
@@ -77,7 +76,7 @@ class StringType:
     bound: int | None = None
 
 
-ValueType = Union[BasicType, StringType, TypeName]
+ValueType = BasicType | StringType | TypeName
 """What an element can be: a basic type, a string, or another message by its name."""
 
 
@@ -97,10 +96,10 @@ class SequenceType:
     bound: int | None = None
 
 
-FieldType = Union[ValueType, ArrayType, SequenceType]
+FieldType = ValueType | ArrayType | SequenceType
 
-ScalarValue = Union[bool, int, float, str]
-Value = Union[ScalarValue, tuple[ScalarValue, ...]]
+ScalarValue = bool | int | float | str
+Value = ScalarValue | tuple[ScalarValue, ...]
 """A constant or default value; a tuple for an array or sequence."""
 
 
@@ -249,7 +248,7 @@ class Action:
 
 _GOAL_ID = Field("goal_id", TypeName("unique_identifier_msgs", "msg", "UUID"))
 
-Interface = Union[Message, Service, Action]
+Interface = Message | Service | Action
 
 
 def messages(interface: Interface, *, events: bool = False) -> tuple[Message, ...]:

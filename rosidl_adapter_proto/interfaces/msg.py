@@ -5,8 +5,10 @@ The rules are those of ROS 2's own `rosidl_adapter`, its treatment of comments, 
 
 from __future__ import annotations
 
+import ast
 import re
 import textwrap
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -48,7 +50,7 @@ _NAME_RULES = {
     "package": re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*"),
     "field": re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*"),
     "message": re.compile(r"[A-Z][A-Za-z0-9]*"),
-    "constant": re.compile(r"[A-Z]([A-Z0-9_]?[A-Z0-9]+)*"),
+    "constant": re.compile(r"(?!.*__)(?!.*_$)[A-Z][A-Z0-9_]*"),
 }
 _NAME_ADVICE = {
     "package": "use lower case letters, digits and single underscores, beginning with a letter",
@@ -56,14 +58,29 @@ _NAME_ADVICE = {
     "message": "use letters and digits, beginning with an upper case letter",
     "constant": "use upper case letters, digits and single underscores, beginning with a letter",
 }
+_NAMES_ELSEWHERE = {
+    "boolean": "bool",
+    "double": "float64",
+    "float": "float32 or float64",
+    "int": "int32 or int64",
+    "long": "int32 or int64",
+    "octet": "byte",
+    "short": "int16",
+    "str": "string",
+    "uint": "uint32 or uint64",
+}
 _ROS1_FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 _DERIVED_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
 
 _TYPE = re.compile(r"(?P<element>[^\[\]]*)(\[(?P<upper_bound><=)?(?P<size>[^\[\]]*)\])?")
 _UNIT = re.compile(r"(\s*\[([^,\]]+)\])")  # no comma: [0, 1] is a range
-_ESCAPE = re.compile(r"""\\([ntvbrfa\\?'"]|[0-7]{1,3}|x[0-9a-fA-F]{1,2}|u[0-9a-fA-F]{4})""")
+# A string inside the quotes of an .idl file, and its escape sequences as `rosidl_parser` knows them (table 7-9).
+_IDL_STRING = re.compile(r"""([^"\\\n\r]|\\[^\n\r])*""")
+_IDL_ESCAPE = re.compile(r"""\\(?:([ntvbrfa\\'"])|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))""")
+_IDL_ESCAPED_AGAIN = re.compile(r'\\(["\\])')
 _SEPARATOR = "---"
+_LONGEST_QUOTATION = 60
 
 
 def parse_msg(text: str, name: TypeName, file: str, *, ros1_names: bool = False) -> Message:
@@ -104,14 +121,14 @@ def _parse_sections(text: str, name: TypeName, file: str, suffixes: tuple[str, .
         raise problem(
             f"expected {expected} line{'s' * (expected > 1)} '{_SEPARATOR}' between {parts}, "
             f"found {len(separators)}",
-            text,
+            "\n".join(lines),
             Location(file, line),
         )
     starts = [0, *(index + 1 for index in separators)]
     ends = [*separators, len(lines)]
     return [
         _MessageReader(text, name.sibling(suffix), file).read(start, end)
-        for suffix, start, end in zip(suffixes, starts, ends)
+        for suffix, start, end in zip(suffixes, starts, ends, strict=True)
     ]
 
 
@@ -123,7 +140,7 @@ class _MessageReader:
         self.name = name
         self.file = file
         self.lines = text.splitlines()
-        self.field_name = _ROS1_FIELD_NAME if ros1_names else _NAME_RULES["field"]
+        self.ros1_names = ros1_names
 
     def read(self, start: int, end: int, text: str = "") -> Message:
         """Read the lines from `start` up to `end`, counted from 0."""
@@ -142,9 +159,9 @@ class _MessageReader:
         elements: list[Field | Constant] = []
         for number, line in enumerate(self.lines[start:end], start + 1):
             code, mark, comment = line.replace("\t", " ").rstrip().partition("#")
-            indented_comment = bool(mark and code and not code.strip())
-            if indented_comment and comments:
-                comments[-1].append(comment.lstrip("#"))
+            if mark and code and not code.strip():
+                # An indented comment goes on with that of the element above; before the first, the message has it.
+                (comments[-1] if comments else message_comment).append(comment.lstrip("#"))
                 continue
             if mark:
                 pending.append(comment.lstrip("#"))
@@ -156,7 +173,7 @@ class _MessageReader:
 
         documented = [
             replace(element, comment=comment, unit=unit)
-            for element, (comment, unit) in zip(elements, map(_comment_and_unit, comments))
+            for element, (comment, unit) in zip(elements, map(_comment_and_unit, comments), strict=True)
         ]
         fields = [element for element in documented if isinstance(element, Field)]
         constants = [element for element in documented if isinstance(element, Constant)]
@@ -171,6 +188,11 @@ class _MessageReader:
     def _element(self, code: str, number: int) -> Field | Constant:
         """Read a field or constant from a line without its comment."""
         type_column = len(code) - len(code.lstrip()) + 1
+        if type_column > 1 and not self.ros1_names:
+            raise self._problem(
+                "ROS 2 does not accept an indented field or constant; begin it in the first column",
+                Location(self.file, number, type_column),
+            )
         type_text, _, rest = code.strip().partition(" ")
         rest = rest.lstrip()
         type_location = Location(self.file, number, type_column)
@@ -180,7 +202,7 @@ class _MessageReader:
         if "=" in rest:
             return self._constant(type_text, rest, type_location, name_location)
         name, _, default_text = rest.partition(" ")
-        if not self.field_name.fullmatch(name):
+        if not (_ROS1_FIELD_NAME if self.ros1_names else _NAME_RULES["field"]).fullmatch(name):
             raise self._bad_name("field", name, name_location)
         field_type = self._type(type_text, type_location)
         default_text = default_text.strip()
@@ -193,6 +215,14 @@ class _MessageReader:
     def _constant(self, type_text: str, rest: str, type_location: Location, location: Location) -> Constant:
         name, _, value_text = rest.partition("=")
         name = name.rstrip()
+        if not name:
+            raise self._problem("expected the name of a constant before '='", location)
+        if " " in name:
+            raise self._problem(
+                "a line with '=' defines a constant, and its name has no spaces; "
+                "the default value of a field is written without '=' and cannot contain one",
+                location,
+            )
         if not _NAME_RULES["constant"].fullmatch(name):
             raise self._bad_name("constant", name, location)
         constant_type = self._type(type_text, type_location)
@@ -203,7 +233,7 @@ class _MessageReader:
             )
         value_text = value_text.strip()
         column = location.column + len(rest) - len(rest.partition("=")[2].lstrip())
-        value = self._value(constant_type, value_text, Location(self.file, location.line, column))
+        value = self._scalar(constant_type, value_text, Location(self.file, location.line, column))
         return Constant(name, constant_type, value, location=location)
 
     def _type(self, text: str, location: Location) -> FieldType:
@@ -228,7 +258,12 @@ class _MessageReader:
             return StringType(base == "wstring", bound)
         if text in ("time", "duration"):
             raise self._problem(f"{text!r} is a ROS 1 type; use builtin_interfaces/{text.title()}", location)
+        if text in _NAMES_ELSEWHERE:
+            raise self._problem(f"{text!r} is not a type in .msg; use {_NAMES_ELSEWHERE[text]}", location)
         package, slash, message = text.rpartition("/")
+        if package.endswith("/msg"):
+            short = f"{package.removesuffix('/msg')}/{message}"
+            raise self._problem(f"{text!r} is not written with '/msg/' in .msg; use {short}", location)
         package = package if slash else self.name.package
         if not _NAME_RULES["package"].fullmatch(package):
             raise self._problem(
@@ -257,12 +292,17 @@ class _MessageReader:
         if isinstance(element, TypeName):
             raise self._problem("a field that is a message cannot have a default value", location)
         if not isinstance(field_type, (ArrayType, SequenceType)):
-            return self._value(element, text, location)
+            return self._scalar(element, text, location)
         if not (text.startswith("[") and text.endswith("]") and len(text) > 1):
-            raise self._problem(f"the default of an array must stand in brackets, not {text!r}", location)
+            raise self._problem(
+                f"the default of an array must stand in brackets, not {_quoted(text)}", location
+            )
         inner = text[1:-1]
         if isinstance(element, StringType):
-            parts = self._split_strings(inner, location)
+            try:
+                parts = _split_strings(inner)
+            except ValueError as error:
+                raise self._problem(str(error), location) from None
         else:
             parts = [part.strip() for part in inner.split(",")] if inner else []
         if isinstance(field_type, ArrayType) and len(parts) != field_type.size:
@@ -276,34 +316,15 @@ class _MessageReader:
                 f"the default of a sequence of at most {field_type.bound} cannot have {len(parts)} elements",
                 location,
             )
-        return tuple(self._value(element, part, location) for part in parts)
-
-    def _split_strings(self, text: str, location: Location) -> list[str]:
-        """Split at commas, except inside quotes; the parts keep their quotes."""
-        parts: list[str] = []
-        rest = text.strip(" ")
-        while rest:
-            if rest[0] in "\"'":
-                match = re.match(rf"{rest[0]}(\\.|[^\\{rest[0]}])*{rest[0]}", rest)
-                if match is None:
-                    raise self._problem(f"the string {rest!r} has no closing quote", location)
-                part = match.group()
-            else:
-                part = rest.partition(",")[0].rstrip(" ")
-            if not part:
-                raise self._problem("expected a string before ','", location)
-            parts.append(part)
-            rest = rest[len(part) :].lstrip(" ")
-            if rest and rest[0] != ",":
-                raise self._problem(f"expected ',' between strings, found {rest!r}", location)
-            rest = rest[1:].lstrip(" ")
-        return parts
-
-    def _value(self, scalar: BasicType | StringType, text: str, location: Location) -> ScalarValue:
         try:
-            if isinstance(scalar, StringType):
-                return _string_value(text, scalar.bound)
-            return _READERS.get(scalar.name, _integer_value)(text, scalar.name)
+            return _array_through_idl(tuple(_value(element, part) for part in parts))
+        except ValueError as error:
+            raise self._problem(str(error), location) from None
+
+    def _scalar(self, scalar: BasicType | StringType, text: str, location: Location) -> ScalarValue:
+        try:
+            value = _value(scalar, text)
+            return _through_idl(value) if isinstance(value, str) else value
         except ValueError as error:
             raise self._problem(str(error), location) from None
 
@@ -322,20 +343,25 @@ class _MessageReader:
         return self._problem(f"{name!r} is not a valid {kind} name; {_NAME_ADVICE[kind]}", location)
 
     def _problem(self, message: str, location: Location) -> DefinitionError:
-        return problem(message, self.text, location)
+        return problem(message, "\n".join(self.lines), location)
 
 
 def _without_suffix(name: str) -> str:
-    """Strip what ROS itself appends to the messages of services and actions."""
+    """Strip what ROS itself puts around the names of messages."""
+    name = name.removeprefix("Sample_")
     for suffix in _DERIVED_SUFFIXES:
         name = name.removesuffix(suffix)
     return name
 
 
+def _quoted(text: str) -> str:
+    return repr(text) if len(text) <= _LONGEST_QUOTATION else f"{text[:_LONGEST_QUOTATION]!r}..."
+
+
 def _boolean_value(text: str, _: str) -> bool:
     values = {"true": True, "1": True, "false": False, "0": False}
     if text.lower() not in values:
-        raise ValueError(f"a bool must be true, false, 1 or 0, not {text!r}")
+        raise ValueError(f"a bool must be true, false, 1 or 0, not {_quoted(text)}")
     return values[text.lower()]
 
 
@@ -343,20 +369,23 @@ def _float_value(text: str, _: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"expected a number with '.' as its decimal point, not {text!r}") from None
+        raise ValueError(f"expected a number with '.' as its decimal point, not {_quoted(text)}") from None
 
 
 def _integer_value(text: str, name: str) -> int:
     lowest, highest = integer_range(name)
+    shown = "byte" if name == "octet" else name
     try:
         value = int(text)
     except ValueError:
         try:
             value = int(text, 0)
         except ValueError:
-            raise ValueError(f"expected a whole number from {lowest} to {highest}, not {text!r}") from None
+            raise ValueError(
+                f"expected a whole number from {lowest} to {highest}, not {_quoted(text)}"
+            ) from None
     if not lowest <= value <= highest:
-        raise ValueError(f"{text} does not fit {name}, which goes from {lowest} to {highest}")
+        raise ValueError(f"{_quoted(text)} does not fit {shown}, which goes from {lowest} to {highest}")
     return value
 
 
@@ -365,6 +394,13 @@ _READERS: dict[str, Callable[[str, str], ScalarValue]] = {
     "float": _float_value,
     "double": _float_value,
 }
+
+
+def _value(scalar: BasicType | StringType, text: str) -> ScalarValue:
+    """Return the value that `text` stands for, strings with their escape sequences as they are."""
+    if isinstance(scalar, StringType):
+        return _string_value(text, scalar.bound)
+    return _READERS.get(scalar.name, _integer_value)(text, scalar.name)
 
 
 def _string_value(text: str, bound: int | None) -> str:
@@ -377,17 +413,116 @@ def _string_value(text: str, bound: int | None) -> str:
             break
     if bound is not None and len(text) > bound:
         raise ValueError(f"the string has {len(text)} characters, more than its bound of {bound}")
-    # ROS 2 unescapes twice: once on the way from .msg to .idl, once when it reads the .idl.
-    return _unescape(_unescape(text))
+    return text
 
 
-def _unescape(text: str) -> str:
-    """Replace the escape sequences of IDL table 7-9."""
+def _split_strings(text: str) -> list[str]:
+    """Split the elements of an array of strings: at commas, and behind closing quotes, which are taken off.
+
+    `rosidl_adapter` takes quotes off once more from each element, and does not miss a comma between quoted ones.
+    """
+    parts: list[str] = []
+    while text:
+        text = text.lstrip(" ")
+        if not text or text[0] == ",":
+            raise ValueError("expected a string before ',' or ']'")
+        is_quoted = False
+        for quote in "\"'":
+            if text.startswith(quote):
+                is_quoted = True
+                end = _closing_quote(text, quote)
+                parts.append(text[1:end].replace(f"\\{quote}", quote))
+                text = text[end + 1 :]
+        if not is_quoted:
+            end = text.find(",") if "," in text else len(text)
+            parts.append(text[:end].strip())
+            text = text[end:]
+        text = text.lstrip(" ").removeprefix(",")
+    return [part.strip() for part in parts]
+
+
+def _closing_quote(text: str, quote: str) -> int:
+    """Return where the string that `text` begins with ends.
+
+    Behind two escaped quotes `rosidl_adapter` loses count and ends the string too early. The default value that the
+    ROS classes have then is the one to find here.
+    """
+    offset = 0
+    while True:
+        end = text.find(quote, 1)
+        if end == -1:
+            raise ValueError(f"a string has no closing {quote}")
+        if text[end - 1] != "\\":
+            return offset + end
+        text, offset = text[end + 1 :], end + 1
+
+
+def _through_idl(text: str) -> str:
+    """Return what ROS 2 makes of a string on its way: `rosidl_adapter` writes it to .idl, `rosidl_parser` reads that.
+
+    Both replace escape sequences, so that most backslashes must be doubled.
+    """
+    if "\\" not in text:
+        return _read_from_idl(text.replace('"', r"\""))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", DeprecationWarning
+            )  # for unknown sequences, which stay as they are
+            decoded = text.encode().decode("unicode_escape")
+        # rosidl_adapter decodes bytes of UTF-8 as characters, and writes characters as bytes.
+        decoded = decoded.encode("latin-1").decode()
+    except UnicodeError:
+        raise ValueError(
+            "ROS 2 cannot read the escape sequences of this string; write characters as they are, in UTF-8, "
+            r"and a backslash as \\\\"
+        ) from None
+    return _read_from_idl(decoded.replace('"', r"\""))
+
+
+def _array_through_idl(values: tuple[ScalarValue, ...]) -> tuple[ScalarValue, ...]:
+    """Return what ROS 2 makes of an array: in .idl, it is the text of a Python tuple."""
+    try:
+        escaped = repr(values).replace("\\", r"\\").replace('"', r"\"").encode("latin-1").decode()
+    except UnicodeError:
+        raise ValueError("ROS 2 only reads ASCII characters in the default of an array of strings") from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            read = ast.literal_eval(_read_from_idl(escaped))
+    except (ValueError, SyntaxError):
+        read = None
+    if not isinstance(read, tuple) or [type(each) for each in read] != [type(each) for each in values]:
+        raise ValueError(
+            "ROS 2 cannot read this default of an array; it takes finite numbers, and strings without "
+            "quotes and backslashes"
+        )
+    return read
+
+
+def _read_from_idl(escaped: str) -> str:
+    """Read what stands between the quotes of a string in .idl, as `rosidl_parser` does."""
+    if not _IDL_STRING.fullmatch(escaped):
+        raise ValueError(
+            "ROS 2 replaces escape sequences twice, and the string is broken after the first time; "
+            r"double each backslash: \\n is a line break, \\\\ a backslash"
+        )
+    if "\\" not in escaped:
+        return escaped
 
     def character(match: re.Match[str]) -> str:
-        return match.group().encode("ascii").decode("unicode_escape") if match[1] != "?" else "?"
+        simple, octal, hexadecimal = match.groups()
+        if simple:
+            return _ESCAPED_CHARACTERS.get(simple, simple)
+        if hexadecimal and len(hexadecimal) == 1:
+            raise ValueError(f"an escape sequence '\\x' has two digits, not only {hexadecimal!r}")
+        return chr(int(octal, 8) if octal else int(hexadecimal, 16))
 
-    return _ESCAPE.sub(character, text)
+    # It looks for escaped quotes and backslashes once more, in what it has decoded.
+    return _IDL_ESCAPED_AGAIN.sub(r"\1", _IDL_ESCAPE.sub(character, escaped))
+
+
+_ESCAPED_CHARACTERS = dict(zip("ntvbrfa", "\n\t\v\b\r\f\a", strict=True))
 
 
 def _comment_and_unit(lines: list[str]) -> tuple[tuple[str, ...], str | None]:

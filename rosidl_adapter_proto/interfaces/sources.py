@@ -6,6 +6,7 @@ of the ROS installation (`AMENT_PREFIX_PATH` and the environment that Python run
 
 from __future__ import annotations
 
+import codecs
 import difflib
 import os
 import re
@@ -14,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from xml.etree import ElementTree
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces import store
@@ -42,7 +44,6 @@ _DERIVED = re.compile(
     r"(_SendGoal|_GetResult)?_(Request|Response|Event|Goal|Result|Feedback)$"
     r"|_(SendGoal|GetResult|FeedbackMessage)$"
 )
-_PACKAGE_NAME = re.compile(r"<name>\s*([A-Za-z0-9_.-]+)\s*</name>")
 _IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE")
 
 
@@ -74,12 +75,16 @@ class Definition:
         if self.stored_text is not None:
             return self.stored_text
         try:
-            return Path(self.file).read_bytes().decode("utf-8-sig")
+            data = Path(self.file).read_bytes()
         except OSError as error:
-            raise DefinitionError(f"cannot read {self.file}: {error.strerror}") from None
+            raise _unreadable(self.file, error) from None
+        try:
+            return data.removeprefix(codecs.BOM_UTF8).decode()
         except UnicodeDecodeError as error:
+            line = error.object[: error.start].count(b"\n") + 1
             raise DefinitionError(
-                f"{self.file}: byte {error.start} is not valid UTF-8; save the file as UTF-8"
+                f"{self.file}:{line}: byte 0x{error.object[error.start]:02x} is not valid UTF-8; "
+                "save the file as UTF-8"
             ) from None
 
     @cached_property
@@ -118,7 +123,7 @@ def folder_source(folder: Path) -> Source:
     """
     packages: dict[str, Package] = {}
     found: dict[str, Path] = {}
-    for package_folder in _package_folders(folder):
+    for package_folder in _package_folders(folder, set()):
         name = _package_name(package_folder)
         package = _read_package(package_folder, name, str(folder))
         if not package:
@@ -131,8 +136,8 @@ def folder_source(folder: Path) -> Source:
         packages[name], found[name] = package, package_folder
     if not packages:
         raise DefinitionError(
-            f"no interface definitions in {folder}: "
-            "a package has .msg, .srv, .action or .idl files in folders named msg, srv and action"
+            f"no interface definitions in {folder}: give the folder of a package, which has .msg, .srv, .action "
+            "or .idl files in folders named msg, srv and action, or a folder of such packages"
         )
     return Source(str(folder), packages)
 
@@ -144,15 +149,15 @@ def file_source(file: Path) -> tuple[Source, TypeName]:
         DefinitionError: The file is not where a package has its definitions.
     """
     absolute = file.absolute()
-    if file.suffix not in SUFFIXES or absolute.parent.name not in NAMESPACES:
+    namespace = absolute.parent.name
+    if namespace not in NAMESPACES or file.suffix not in (".idl", f".{namespace}"):
         raise DefinitionError(
-            f"{file} is not part of a package: "
-            "a definition is a .msg, .srv, .action or .idl file in <package>/msg, <package>/srv or "
-            "<package>/action"
+            f"{file} is not part of a package: a definition is <package>/msg/<Name>.msg, "
+            "<package>/srv/<Name>.srv or <package>/action/<Name>.action, or an .idl file in one of these folders"
         )
     folder = absolute.parent.parent
     name = _package_name(folder)
-    type_name = TypeName(name, absolute.parent.name, file.stem)
+    type_name = TypeName(name, namespace, file.stem)
     package = dict(_read_package(folder, name, str(file)))
     # The file that was named counts, even if the package has the same type in another format.
     package[type_name] = Definition(type_name, file.suffix, str(file), str(file))
@@ -239,11 +244,11 @@ class Sources:
         package = self.package(name.package)
         owner = self.owner(name)
         if owner is None:
-            names = [str(each) for each in package]
             origin = next(iter(package.values())).origin
+            others = [each.origin for each in self.sources if name in each.packages.get(name.package, {})]
+            hint = f"; {others[0]} has it, but comes later" if others else _near_types(str(name), package)
             raise DefinitionError(
-                f"type {str(name)!r} was not found in package {name.package!r} of {origin}"
-                f"{_near_misses(str(name), names)}"
+                f"type {str(name)!r} was not found in package {name.package!r} of {origin}{hint}"
             )
         return package[owner]
 
@@ -253,7 +258,9 @@ class Sources:
         if name in package:
             return name
         base = TypeName(name.package, name.namespace, _DERIVED.sub("", name.name))
-        return base if base in package else None
+        if base == name or base not in package:
+            return None
+        return base if name in {each.name for each in structs(package[base].interface)} else None
 
     def definition_name(self, name: TypeName) -> TypeName:
         """Return the interface that `name` is, or is a part of; errors are those of `definition`."""
@@ -289,15 +296,18 @@ class Sources:
         """
         package, _, rest = text.partition("/")
         if "/" in rest:
-            return self.definition(TypeName.parse(text)).name
-        candidates = [each for each in self.package(package) if each.name == rest]
+            try:
+                return self.definition(TypeName.parse(text)).name
+            except ValueError as error:
+                raise DefinitionError(str(error)) from None
+        self.package(package)
+        found = [self.owner(TypeName(package, namespace, rest)) for namespace in NAMESPACES]
+        candidates = [each for each in found if each]
         if len(candidates) > 1:
             raise DefinitionError(
                 f"{text!r} could be any of {', '.join(map(str, candidates))}; give the full name"
             )
-        if not candidates:
-            return self.definition(TypeName(package, "msg", rest)).name
-        return candidates[0]
+        return candidates[0] if candidates else self.definition(TypeName(package, "msg", rest)).name
 
     def shadowed(self, names: Iterable[TypeName]) -> Iterator[tuple[Definition, Definition]]:
         """Yield what wins and what loses where two sources define one of `names` differently.
@@ -310,7 +320,7 @@ class Sources:
                 loser = source.packages.get(name.package, {}).get(name)
                 if loser is None or loser.stored_text is not None or loser.file == winner.file:
                     continue
-                if loser.text != winner.text and loser.interface != winner.interface:
+                if not _is_same(winner, loser):
                     yield winner, loser
 
     def places(self) -> str:
@@ -338,34 +348,21 @@ def closure(
     whole, single = list(packages), list(types)
     partial = {name.package for name in single} - set(whole)
     order: dict[TypeName, None] = {}
-    open_path: list[TypeName] = []
     missing: dict[str, list[str]] = {}
 
-    def visit(name: TypeName) -> None:
-        if name in order:
-            return
-        open_path.append(name)
-        interface = sources.definition(name).interface
-        for needed, user in _needs(interface, events):
+    def needs(name: TypeName) -> Iterator[tuple[TypeName, str]]:
+        for needed, user in _needs(sources.definition(name).interface, events):
             owner = sources.owner(needed)
             if owner is None:
                 missing.setdefault(str(needed), []).append(user)
-            elif owner in open_path and owner != name:
-                chain = " -> ".join(map(str, [*open_path[open_path.index(owner) :], owner]))
-                raise DefinitionError(f"messages cannot contain each other: {chain}")
-            elif owner == name and needed == name:
-                raise DefinitionError(f"a message cannot contain itself: {user}")
             else:
-                visit(owner)
-        open_path.pop()
-        order[name] = None
+                yield owner, user
 
     queue = [name for package in whole for name in sources.package(package)]
     queue += [sources.definition(name).name for name in single]
     complete = set(whole)
     while queue:
-        for name in queue:
-            visit(name)
+        _order_by_need(queue, needs, order)
         needed_packages = {name.package for name in order} - complete - partial
         complete |= needed_packages
         queue = [name for package in sorted(needed_packages) for name in sources.package(package)]
@@ -375,14 +372,69 @@ def closure(
 
 
 def _needs(interface: Interface, events: bool) -> Iterator[tuple[TypeName, str]]:
-    """Yield each type that the messages of an interface refer to, and the field that does, with its place."""
-    parts = messages(interface, events=events)
-    own = {message.name for message in parts}
-    for message in parts:
-        for field, name in references(message):
-            if name not in own or isinstance(interface, Message):
-                place = f" ({field.location})" if field.location else ""
-                yield name, f"{message.name}.{field.name}{place}"
+    """Yield each type outside an interface that its messages refer to, and the field that does, with its place.
+
+    Raises:
+        DefinitionError: The messages of the interface contain each other.
+    """
+    own = {message.name: message for message in messages(interface, events=events)}
+    _order_by_need(own, lambda name: (each for each in _users(own[name]) if each[0] in own), {})
+    for message in own.values():
+        yield from (each for each in _users(message) if each[0] not in own)
+
+
+def _users(message: Message) -> Iterator[tuple[TypeName, str]]:
+    for field, name in references(message):
+        place = f" ({field.location})" if field.location else ""
+        yield name, f"{message.name}.{field.name}{place}"
+
+
+def _order_by_need(
+    names: Iterable[TypeName],
+    needs: Callable[[TypeName], Iterator[tuple[TypeName, str]]],
+    order: dict[TypeName, None],
+) -> None:
+    """Add `names` and everything they need to `order`, what is needed first.
+
+    It does not recurse: definitions may be nested deeper than Python's stack.
+
+    Raises:
+        DefinitionError: Some need each other.
+    """
+    for first in names:
+        if first in order:
+            continue
+        # What is on the way from `first` to the current name, with what each still has to visit.
+        path = {first: needs(first)}
+        users: list[str] = []
+        while path:
+            current = next(reversed(path))
+            for needed, user in path[current]:
+                if needed in path:
+                    start = list(path).index(needed)
+                    raise _cycle_error([*path][start:], [*users[start:], user])
+                if needed not in order:
+                    path[needed] = needs(needed)
+                    users.append(user)
+                    break
+            else:
+                order[current] = None
+                del path[current]
+                del users[-1:]
+
+
+def _cycle_error(names: list[TypeName], users: list[str]) -> DefinitionError:
+    if len(names) == 1:
+        return DefinitionError(f"a message cannot contain itself: {users[0]}")
+    contained = [*names[1:], names[0]]
+    lines = [f"  {user} is a {name}" for user, name in zip(users, contained, strict=True)]
+    if len(lines) > _LONGEST_CHAIN:
+        lines[_LONGEST_CHAIN - 1 : -1] = [f"  ... {len(lines) - _LONGEST_CHAIN} more"]
+    return DefinitionError("\n".join(["messages cannot contain each other:", *lines]))
+
+
+_LONGEST_CHAIN = 10
+"""How much of a chain of messages an error shows."""
 
 
 def _missing_error(sources: Sources, missing: Mapping[str, list[str]]) -> DefinitionError:
@@ -391,43 +443,73 @@ def _missing_error(sources: Sources, missing: Mapping[str, list[str]]) -> Defini
         more = f" and {len(users) - 1} more" if len(users) > 1 else ""
         package = name.partition("/")[0]
         if package in sources.packages:
-            near = _near_misses(name, [str(each) for each in sources.packages[package]])
+            near = _near_types(name, sources.packages[package])
         else:
             near = _near_misses(package, sources.packages)
         lines.append(f"{name} was not found, but {users[0]}{more} needs it{near}")
     return DefinitionError("\n".join([*lines, sources.places()]))
 
 
-def _near_misses(name: str, known: Iterable[str]) -> str:
+def _is_same(one: Definition, other: Definition) -> bool:
+    try:
+        return one.text == other.text or one.interface == other.interface
+    except DefinitionError:
+        return False
+
+
+def _near_types(name: str, package: Package) -> str:
+    """Suggest types of a package by their last name alone: all else is alike, and would make everything similar."""
+    by_last_name: dict[str, str] = {each.name: str(each) for each in package}
+    return _near_misses(name.rpartition("/")[2], by_last_name, by_last_name)
+
+
+def _near_misses(name: str, known: Iterable[str], shown: Mapping[str, str] | None = None) -> str:
     by_lower = {each.lower(): each for each in known}
     near = [by_lower[each] for each in difflib.get_close_matches(name.lower(), by_lower, n=3)]
-    return f"; did you mean {' or '.join(near)}?" if near else ""
+    words = " or ".join(shown[each] if shown else each for each in near)
+    return f"; did you mean {words}?" if near else ""
 
 
-def _package_folders(folder: Path) -> Iterator[Path]:
-    """Yield the package folders at and below `folder`; nothing is looked for inside a package."""
-    if any((folder / marker).exists() for marker in _IGNORE_MARKERS):
+def _unreadable(path: str | Path, error: OSError) -> DefinitionError:
+    return DefinitionError(f"cannot read {path}: {error.strerror}")
+
+
+def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
+    """Yield the package folders at and below `folder`; nothing is looked for inside a package.
+
+    Args:
+        folder: Where to look.
+        seen: The real paths that were looked at, since symbolic links may lead back.
+    """
+    real_path = os.path.realpath(folder)
+    if real_path in seen or any((folder / marker).exists() for marker in _IGNORE_MARKERS):
         return
+    seen.add(real_path)
     if (folder / "package.xml").is_file() or any((folder / namespace).is_dir() for namespace in NAMESPACES):
         yield folder
         return
     try:
         children = sorted(entry.name for entry in os.scandir(folder) if entry.is_dir())
     except OSError as error:
-        raise DefinitionError(f"cannot read {folder}: {error.strerror}") from None
+        raise _unreadable(folder, error) from None
     for child in children:
         if not child.startswith("."):
-            yield from _package_folders(folder / child)
+            yield from _package_folders(folder / child, seen)
 
 
 def _package_name(folder: Path) -> str:
     manifest = folder / "package.xml"
-    if manifest.is_file():
-        match = _PACKAGE_NAME.search(manifest.read_text(encoding="utf-8", errors="replace"))
-        if match is None:
-            raise DefinitionError(f"{manifest} has no <name>")
-        return match[1]
-    return folder.resolve().name
+    if not manifest.is_file():
+        return folder.resolve().name
+    try:
+        name = (ElementTree.parse(manifest).getroot().findtext("name") or "").strip()
+    except OSError as error:
+        raise _unreadable(manifest, error) from None
+    except ElementTree.ParseError as error:
+        raise DefinitionError(f"{manifest} is not valid XML: {error}") from None
+    if not name:
+        raise DefinitionError(f"{manifest} has no <name>; give the package one")
+    return name
 
 
 def _read_package(folder: Path, name: str, origin: str) -> Package:
@@ -437,6 +519,8 @@ def _read_package(folder: Path, name: str, origin: str) -> Package:
             files = sorted(os.listdir(folder / namespace))
         except (FileNotFoundError, NotADirectoryError):
             continue
+        except OSError as error:
+            raise _unreadable(folder / namespace, error) from None
         for suffix in SUFFIXES:
             if suffix not in (".idl", f".{namespace}"):
                 continue

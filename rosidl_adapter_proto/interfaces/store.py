@@ -5,19 +5,17 @@ It holds messages only (no services, no actions), without comments and default v
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, TypeName
 
-if TYPE_CHECKING:
-    from rosbags.interfaces.typing import FieldDesc, MsgDef, Typesdict
-
 _ROS1 = "noetic"
 
 
-@lru_cache(maxsize=None)
+@cache
 def distributions() -> tuple[str, ...]:
     """Return the names of the distributions in the store, oldest first: `noetic`, then those of ROS 2."""
     from rosbags.typesys import Stores
@@ -45,8 +43,8 @@ def definitions(distribution: str) -> dict[TypeName, str]:
     from rosbags.typesys import Stores, get_typestore
 
     generation = "ros1" if distribution == _ROS1 else "ros2"
-    types: Typesdict = get_typestore(Stores(f"{generation}_{distribution}")).fielddefs
-    return {TypeName.parse(name): _msg_text(definition) for name, definition in types.items()}
+    types = get_typestore(Stores(f"{generation}_{distribution}")).fielddefs
+    return {TypeName.parse(name): _msg_text(constants, fields) for name, (constants, fields) in types.items()}
 
 
 def has_ros1_names(distribution: str) -> bool:
@@ -54,14 +52,13 @@ def has_ros1_names(distribution: str) -> bool:
     return distribution == _ROS1
 
 
-def _msg_text(definition: MsgDef) -> str:
-    constants, fields = definition
+def _msg_text(constants: Iterable[Any], fields: Iterable[Any]) -> str:
     lines = [f"{type_} {name}={value}" for name, type_, value in constants]
     lines += [f"{_type_text(field)} {name}" for name, field in fields if name != EMPTY_STRUCT_FIELD]
     return "".join(f"{line}\n" for line in lines)
 
 
-def _type_text(field: FieldDesc) -> str:
+def _type_text(field: Any) -> str:
     from rosbags.interfaces import Nodetype
 
     kind, detail = field

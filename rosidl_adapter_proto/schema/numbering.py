@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from rosidl_adapter_proto.errors import SchemaError
-from rosidl_adapter_proto.interfaces.model import ArrayType, FieldType, Message, SequenceType
+from rosidl_adapter_proto.interfaces.model import FieldType, Message
 from rosidl_adapter_proto.schema.typemap import is_repeated, proto_type
 
 # Protobuf language guide (proto3), "Assigning Field Numbers".

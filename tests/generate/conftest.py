@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import os
 import sys
 from collections.abc import Iterator
@@ -50,7 +51,7 @@ def ros_install(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Generated]
         for source in sources.sources
         if source.origin.startswith("ROS prefix")
         for name in source.packages
-        if importlib.util.find_spec(name)
+        if (spec := importlib.util.find_spec(name)) and spec.origin
     ]
     folder = tmp_path_factory.mktemp("ros_install")
     result = generate(Request(tuple(packages)), sources, folder, Options(events=True))

@@ -1,0 +1,488 @@
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rosidl_adapter_proto.errors import DefinitionError
+from rosidl_adapter_proto.interfaces.idl import parse_idl
+from rosidl_adapter_proto.interfaces.model import (
+    EMPTY_STRUCT_FIELD,
+    Action,
+    ArrayType,
+    BasicType,
+    Constant,
+    Field,
+    FieldType,
+    Interface,
+    Location,
+    Message,
+    SequenceType,
+    Service,
+    StringType,
+    TypeName,
+)
+from rosidl_adapter_proto.interfaces.msg import parse_action, parse_msg, parse_srv
+from tests import oracle
+from tests.pipeline import facts, official, parts
+
+FOO = TypeName("pkg", "msg", "Foo")
+DO = TypeName("pkg", "srv", "Do")
+GO = TypeName("pkg", "action", "Go")
+BOOL, BYTE, UINT8, INT8, UINT16, INT32, INT64, UINT64, FLOAT, DOUBLE = (
+    BasicType(name)
+    for name in "boolean octet uint8 int8 uint16 int32 int64 uint64 float double".split()
+)
+STRING, WSTRING = StringType(), StringType(wide=True)
+EMPTY = (Field(EMPTY_STRUCT_FIELD, UINT8),)
+
+PARSERS: dict[str, Callable[[str, TypeName, str], Interface]] = {
+    "msg": parse_msg,
+    "srv": parse_srv,
+    "action": parse_action,
+}
+
+
+def parse(text: str, name: TypeName = FOO) -> Interface:
+    return PARSERS[name.namespace](text, name, f"{name.name}.{name.namespace}")
+
+
+def parse_message(text: str) -> Message:
+    message = parse(text)
+    assert isinstance(message, Message)
+    return message
+
+
+def error_of(text: str, name: TypeName = FOO) -> str:
+    with pytest.raises(DefinitionError) as caught:
+        parse(text, name)
+    return str(caught.value)
+
+
+# What ROS installs
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for suffix in (".msg", ".srv", ".action") for path in oracle.installed_definitions(suffix)],
+    ids=lambda path: str(oracle.type_name(path)),
+)
+def test_installed_definitions_are_read_as_ros_reads_them(path: Path, tmp_path: Path) -> None:
+    name, text = oracle.type_name(path), path.read_text("utf-8")
+    ours = PARSERS[name.namespace](text, name, str(path))
+    theirs = official(text, name, tmp_path)
+    assert theirs is not None
+    assert facts(ours) == facts(theirs)
+    idl = path.with_suffix(".idl")
+    if idl.exists():  # test_interface_files has none
+        assert ours == parse_idl(idl.read_text("utf-8"), name, str(idl))
+
+
+def test_there_are_installed_definitions(ros_prefix: Path) -> None:
+    assert len(oracle.installed_definitions(".msg")) > 150
+    assert len(oracle.installed_definitions(".srv")) > 25
+    assert len(oracle.installed_definitions(".action")) > 1
+
+
+# Fields
+
+FIELDS: list[tuple[str, Field]] = [
+    # Types
+    *(
+        (f"{spelling} x", Field("x", type_))
+        for spelling, type_ in {
+            "bool": BOOL,
+            "byte": BYTE,
+            "char": UINT8,
+            "int8": INT8,
+            "uint8": UINT8,
+            "int16": BasicType("int16"),
+            "uint16": UINT16,
+            "int32": INT32,
+            "uint32": BasicType("uint32"),
+            "int64": INT64,
+            "uint64": UINT64,
+            "float32": FLOAT,
+            "float64": DOUBLE,
+            "string": STRING,
+            "wstring": WSTRING,
+            "string<=5": StringType(bound=5),
+            "wstring<=1_000": StringType(True, 1000),
+            "string<=+5": StringType(bound=5),
+            "Foo": FOO,
+            "Bar": TypeName("pkg", "msg", "Bar"),
+            "other/Bar": TypeName("other", "msg", "Bar"),
+            "o2_x/B1": TypeName("o2_x", "msg", "B1"),
+            "Sample_Bar": TypeName("pkg", "msg", "Sample_Bar"),
+            "other/Bar_Request": TypeName("other", "msg", "Bar_Request"),
+            "Bar_Feedback_Response": TypeName("pkg", "msg", "Bar_Feedback_Response"),
+            "Int32": TypeName("pkg", "msg", "Int32"),
+            "int32[]": SequenceType(INT32),
+            "int32[3]": ArrayType(INT32, 3),
+            "int32[+3]": ArrayType(INT32, 3),
+            "int32[<=3]": SequenceType(INT32, 3),
+            "byte[]": SequenceType(BYTE),
+            "string<=5[]": SequenceType(StringType(bound=5)),
+            "string<=5[2]": ArrayType(StringType(bound=5), 2),
+            "wstring<=5[<=2]": SequenceType(StringType(True, 5), 2),
+            "Bar[2]": ArrayType(TypeName("pkg", "msg", "Bar"), 2),
+            "other/Bar[<=2]": SequenceType(TypeName("other", "msg", "Bar"), 2),
+        }.items()
+    ),
+    # Names
+    *((f"string {name}", Field(name, STRING)) for name in "module string int8 x1 a_b_c x_1 default".split()),
+    (f"int8 {EMPTY_STRUCT_FIELD}", Field(EMPTY_STRUCT_FIELD, INT8)),
+    # White space
+    ("int32\tx\t5", Field("x", INT32, 5)),
+    ("int32    x    5   ", Field("x", INT32, 5)),
+    ("int32 x \N{IDEOGRAPHIC SPACE}", Field("x", INT32)),
+    # Integers
+    ("int32 x 10", Field("x", INT32, 10)),
+    ("int32 x 010", Field("x", INT32, 10)),
+    ("int32 x -0", Field("x", INT32, 0)),
+    ("int32 x +5", Field("x", INT32, 5)),
+    ("int32 x 1_000", Field("x", INT32, 1000)),
+    ("int32 x 0xff", Field("x", INT32, 255)),
+    ("int32 x -0XF_F", Field("x", INT32, -255)),
+    ("int32 x 0o17", Field("x", INT32, 15)),
+    ("int32 x 0b101", Field("x", INT32, 5)),
+    ("int8 x -128", Field("x", INT8, -128)),
+    ("uint16 x 65535", Field("x", UINT16, 65535)),
+    ("uint64 x 18446744073709551615", Field("x", UINT64, 2**64 - 1)),
+    ("int64 x -9223372036854775808", Field("x", INT64, -(2**63))),
+    ("byte x 0xff", Field("x", BYTE, 255)),
+    ("char x 65", Field("x", UINT8, 65)),
+    # Booleans
+    *((f"bool x {text}", Field("x", BOOL, True)) for text in "true True TRUE tRuE 1".split()),
+    *((f"bool x {text}", Field("x", BOOL, False)) for text in "false False FALSE fAlSe 0".split()),
+    # Numbers
+    ("float32 x 1", Field("x", FLOAT, 1.0)),
+    ("float64 x .5", Field("x", DOUBLE, 0.5)),
+    ("float64 x 5.", Field("x", DOUBLE, 5.0)),
+    ("float64 x -1.5e-3", Field("x", DOUBLE, -0.0015)),
+    ("float64 x 1e-7", Field("x", DOUBLE, 1e-7)),
+    ("float64 x 1E22", Field("x", DOUBLE, 1e22)),
+    ("float64 x -0.0", Field("x", DOUBLE, -0.0)),
+    ("float64 x 1_0.5", Field("x", DOUBLE, 10.5)),
+    ("float64 x 123456789012345678901234567890", Field("x", DOUBLE, 1.2345678901234568e29)),
+    ("float32 x 1e400", Field("x", FLOAT, math.inf)),
+    ("float64 x inf", Field("x", DOUBLE, math.inf)),
+    ("float64 x Infinity", Field("x", DOUBLE, math.inf)),
+    ("float64 x NaN", Field("x", DOUBLE, math.nan)),
+    # Strings
+    ("string x a b  c", Field("x", STRING, "a b  c")),
+    ('string x " a "', Field("x", STRING, " a ")),
+    ("string x ' a '", Field("x", STRING, " a ")),
+    ('string x ""', Field("x", STRING, "")),
+    ("string x ''", Field("x", STRING, "")),
+    ('string x "', Field("x", STRING, "")),
+    ('string x "a', Field("x", STRING, '"a')),
+    ("string x a'", Field("x", STRING, "a'")),
+    ("string x \"it's\"", Field("x", STRING, "it's")),
+    (r"string x 'it\'s'", Field("x", STRING, "it's")),
+    (r'string x "say \"a\""', Field("x", STRING, 'say "a"')),
+    ('string x "say "', Field("x", STRING, "say ")),
+    ("string x 'say \"a\"'", Field("x", STRING, 'say "a"')),
+    ('string x a"b', Field("x", STRING, 'a"b')),
+    ("string x grün €", Field("x", STRING, "grün €")),
+    ("wstring x 'grün €'", Field("x", WSTRING, "grün €")),
+    ("string<=5 x abcde", Field("x", StringType(bound=5), "abcde")),
+    ("string x a\tb", Field("x", STRING, "a b")),
+    ("string x 1", Field("x", STRING, "1")),
+    ("string x [a]", Field("x", STRING, "[a]")),
+    ("string x // a", Field("x", STRING, "// a")),
+    ("string x @(a) @@ %s {0}", Field("x", STRING, "@(a) @@ %s {0}")),
+    # A '#' begins a comment even inside quotes
+    ('string x "a#b"', Field("x", STRING, '"a', ('b"',))),
+    ("string x 'a # b' # c", Field("x", STRING, "'a", ("b' # c",))),
+    # Escape sequences are replaced twice
+    (r"string x a\\nb", Field("x", STRING, "a\nb")),
+    (r"string x \\n\\t\\v\\b\\r\\f\\a\\'\\x41\\101", Field("x", STRING, "\n\t\v\b\r\f\a'AA")),
+    (r"string x \t\v\b\f\a\'\x41\101", Field("x", STRING, "\t\v\b\f\a'AA")),
+    (r"string x \\\\", Field("x", STRING, "\\")),
+    (r"string x \\\\\\\\", Field("x", STRING, "\\")),
+    (r"string x \\\\n", Field("x", STRING, r"\n")),
+    (r"string x C:\\\\dir", Field("x", STRING, r"C:\dir")),
+    (r"string x \d\?", Field("x", STRING, r"\d\?")),
+    (r"string x \\d\\?", Field("x", STRING, r"\d\?")),
+    (r"string x \xc3\xb6", Field("x", STRING, "ö")),
+    (r"string x \\xf6", Field("x", STRING, "ö")),
+    (r"string x \\777", Field("x", STRING, "ǿ")),
+    (r"string x \N{DIGIT ONE}", Field("x", STRING, "1")),
+    (r"string x \\u20ac", Field("x", STRING, r"\u20ac")),
+    (r"wstring x \\u20ac", Field("x", WSTRING, r"\u20ac")),
+    # Arrays
+    ("int32[] x []", Field("x", SequenceType(INT32), ())),
+    ("int32[] x [1]", Field("x", SequenceType(INT32), (1,))),
+    ("int32[3] x [1, 0x2 ,-3]", Field("x", ArrayType(INT32, 3), (1, 2, -3))),
+    ("int32[<=3] x [1,2]", Field("x", SequenceType(INT32, 3), (1, 2))),
+    ("bool[2] x [true, 0]", Field("x", ArrayType(BOOL, 2), (True, False))),
+    ("byte[] x [255]", Field("x", SequenceType(BYTE), (255,))),
+    ("char[] x [65]", Field("x", SequenceType(UINT8), (65,))),
+    ("float32[2] x [1, -2.5e3]", Field("x", ArrayType(FLOAT, 2), (1.0, -2500.0))),
+    ("string[] x []", Field("x", SequenceType(STRING), ())),
+    ("string[] x [a b, c]", Field("x", SequenceType(STRING), ("a b", "c"))),
+    ('string[] x ["a, b", \'c\']', Field("x", SequenceType(STRING), ("a, b", "c"))),
+    ('string[] x ["a",]', Field("x", SequenceType(STRING), ("a",))),
+    ('string[] x ["a" "b"]', Field("x", SequenceType(STRING), ("a", "b"))),
+    ("string[] x ['''a''']", Field("x", SequenceType(STRING), ("", "a", ""))),
+    ('string[] x [""]', Field("x", SequenceType(STRING), ("",))),
+    ('string[] x [" a "]', Field("x", SequenceType(STRING), ("a",))),
+    ("string[] x [\"it's\", 'a\"b']", Field("x", SequenceType(STRING), ("it's", 'a"b'))),
+    (r'string[] x ["a\"b"]', Field("x", SequenceType(STRING), ('a"b',))),
+    (r"string[] x ['a\'b']", Field("x", SequenceType(STRING), ("a'b",))),
+    (r'string[] x ["a\"b\"c"]', Field("x", SequenceType(STRING), ('a"', '"c"'))),
+    (r'string[] x ["\n", \\t]', Field("x", SequenceType(STRING), ("\n", "\\t"))),
+    ('string[2] x ["[", "]"]', Field("x", ArrayType(STRING, 2), ("[", "]"))),
+    ("string<=3[] x [abc]", Field("x", SequenceType(StringType(bound=3)), ("abc",))),
+    ('wstring[] x ["a"]', Field("x", SequenceType(WSTRING), ("a",))),
+    # Comments and units
+    ("int32 x # a", Field("x", INT32, None, ("a",))),
+    ("int32 x#a", Field("x", INT32, None, ("a",))),
+    ("int32 x 5#a", Field("x", INT32, 5, ("a",))),
+    ("int32 x ### a", Field("x", INT32, None, ("a",))),
+    ("int32 x #", Field("x", INT32)),
+    ("int32 x # grün €", Field("x", INT32, None, ("grün €",))),
+    ('int32 x # "quoted" @(a) // b */', Field("x", INT32, None, ('"quoted" @(a) // b */',))),
+    ("int32 x # [m]", Field("x", INT32, None, (), "m")),
+    ("int32 x # in [m/s^2] upwards", Field("x", INT32, None, ("in upwards",), "m/s^2")),
+    ("int32 x # [m] or [s]", Field("x", INT32, None, ("[m] or [s]",))),
+    ("int32 x # in [0, 1]", Field("x", INT32, None, ("in [0, 1]",))),
+    ("int32 x # [rad] in [0, 1]", Field("x", INT32, None, ("in [0, 1]",), "rad")),
+    ("int32 x # []", Field("x", INT32, None, ("[]",))),
+    ("int32 x # [m", Field("x", INT32, None, ("[m",))),
+    ("int32[3] x # [ m ]", Field("x", ArrayType(INT32, 3), None, (), " m ")),
+]
+
+
+def shown(field: Field) -> tuple[object, ...]:
+    return field.name, field.type, repr(field.default), field.comment, field.unit
+
+
+@pytest.mark.parametrize(("line", "expected"), FIELDS, ids=[line for line, _ in FIELDS])
+def test_fields(line: str, expected: Field, tmp_path: Path) -> None:
+    message = parse_message(line)
+    assert [shown(each) for each in message.fields] == [shown(expected)]
+    assert message.constants == ()
+    theirs = official(line, FOO, tmp_path)
+    assert theirs is not None
+    assert facts(message) == facts(theirs)
+
+
+# Constants
+
+CONSTANTS: list[tuple[str, Constant]] = [
+    *(
+        (f"{spelling} X=1", Constant("X", type_, 1))
+        for spelling, type_ in {"byte": BYTE, "char": UINT8, "int8": INT8, "uint16": UINT16}.items()
+    ),
+    ("int32 X = 5", Constant("X", INT32, 5)),
+    ("int32 X\t=\t0x1F", Constant("X", INT32, 31)),
+    ("uint64 MAX_2=18446744073709551615", Constant("MAX_2", UINT64, 2**64 - 1)),
+    ("bool X=True", Constant("X", BOOL, True)),
+    ("bool X=0", Constant("X", BOOL, False)),
+    ("float32 X=1", Constant("X", FLOAT, 1.0)),
+    ("float64 X=-.5", Constant("X", DOUBLE, -0.5)),
+    ("float64 X=nan", Constant("X", DOUBLE, math.nan)),
+    ("string X=", Constant("X", STRING, "")),
+    ("string X=a b", Constant("X", STRING, "a b")),
+    ('string X=" a "', Constant("X", STRING, " a ")),
+    ("string X==", Constant("X", STRING, "=")),
+    ("string X=a=b", Constant("X", STRING, "a=b")),
+    ('string X="grün"', Constant("X", STRING, "grün")),
+    (r"string X=a\\nb", Constant("X", STRING, "a\nb")),
+    ("string X='a # b'", Constant("X", STRING, "'a", ("b'",))),
+    ("wstring X=grün €", Constant("X", WSTRING, "grün €")),
+    ("int32 X=1 # at most [m/s]", Constant("X", INT32, 1, ("at most",), "m/s")),
+    ("# above\n\nint32 Y=2\n# before\nint32 X=1 # behind", Constant("X", INT32, 1, ("before", "behind"))),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), CONSTANTS, ids=[text for text, _ in CONSTANTS])
+def test_constants(text: str, expected: Constant, tmp_path: Path) -> None:
+    message = parse_message(text)
+    found = message.constants[-1]
+    assert (repr(found), found.comment, found.unit) == (repr(expected), expected.comment, expected.unit)
+    assert message.fields == EMPTY
+    theirs = official(text, FOO, tmp_path)
+    assert theirs is not None
+    assert facts(message) == facts(theirs)
+
+
+# Lines, comments and the places of fields
+
+A_AND_B = {"a": (), "b": ()}
+LAYOUTS: list[tuple[str, dict[str, tuple[str, ...]], tuple[str, ...]]] = [
+    # Each row: the text, the comments of its fields, the comment of the message
+    ("", {EMPTY_STRUCT_FIELD: ()}, ()),
+    ("   \n\n\t\n", {EMPTY_STRUCT_FIELD: ()}, ()),
+    ("#", {EMPTY_STRUCT_FIELD: ()}, ()),
+    ("# only a comment", {EMPTY_STRUCT_FIELD: ()}, ("only a comment",)),
+    ("int8 a\nint8 b", A_AND_B, ()),
+    ("int8 a\nint8 b\n", A_AND_B, ()),
+    ("int8 a\r\nint8 b\r\n", A_AND_B, ()),
+    ("int8 a\rint8 b", A_AND_B, ()),
+    ("int8 a\fint8 b", A_AND_B, ()),
+    ("int8 a\vint8 b", A_AND_B, ()),
+    ("int8 a\x1cint8 b", A_AND_B, ()),
+    ("int8 a\u2028int8 b", A_AND_B, ()),
+    ("\nint8 a\n\n\n  \nint8 b  \n\n", A_AND_B, ()),
+    ("# file\nint8 a\nint8 b", A_AND_B, ("file",)),
+    ("# file\n\n# first\nint8 a\n# second\nint8 b", {"a": ("first",), "b": ("second",)}, ("file",)),
+    ("\n# first\nint8 a # behind\nint8 b", {"a": ("first", "behind"), "b": ()}, ()),
+    ("\n# first\n\n# again\nint8 a\nint8 b", {"a": ("first", "again"), "b": ()}, ()),
+    ("\n#\n# 1\n#\n#\n# 2\n#\nint8 a\nint8 b", {"a": ("1", "", "2"), "b": ()}, ()),
+    ("\n#  1\n#    2\n#   3\nint8 a\nint8 b", {"a": ("1", "  2", " 3"), "b": ()}, ()),
+    ("\n#1\n# 2\nint8 a\nint8 b", {"a": ("1", " 2"), "b": ()}, ()),
+    ("\n####\n## 1 ##\n####\nint8 a\nint8 b", {"a": ("1 ##",), "b": ()}, ()),
+    ("\n#\t1\t2\nint8 a\nint8 b", {"a": ("1 2",), "b": ()}, ()),
+    ("int8 a\n  # more\n\t# again\n# next\nint8 b", {"a": ("more", "again"), "b": ("next",)}, ()),
+    ("int8 a # 1\n   #   2\nint8 b", {"a": ("1", "  2"), "b": ()}, ()),
+    ("  # indented\nint8 a\nint8 b", A_AND_B, ("indented",)),
+    ("# file\n# \n#   more\n\nint8 a\nint8 b\n# end", A_AND_B, ("file", "", "  more", "", "end")),
+    ("int8 a\nint8 b\n# end\n\n# of file", A_AND_B, ("end", "of file")),
+    ("# speed in [m/s]\nint8 a\nint8 b", A_AND_B, ("speed in [m/s]",)),
+]
+
+
+@pytest.mark.parametrize(("text", "fields", "comment"), LAYOUTS, ids=[repr(row[0]) for row in LAYOUTS])
+def test_layouts(
+    text: str, fields: dict[str, tuple[str, ...]], comment: tuple[str, ...], tmp_path: Path
+) -> None:
+    message = parse_message(text)
+    assert {each.name: each.comment for each in message.fields} == fields
+    assert message.comment == comment
+    assert message.text == text
+    theirs = official(text, FOO, tmp_path)
+    assert theirs is not None
+    assert facts(message) == facts(theirs)
+
+
+def test_locations() -> None:
+    message = parse_message("# file\r\n\r\nint8 a\r\nint8\t \tb 5 # c\r\nint8  X = 3")
+    assert [each.location for each in (*message.fields, *message.constants)] == [
+        Location("Foo.msg", 3, 6),
+        Location("Foo.msg", 4, 8),
+        Location("Foo.msg", 5, 7),
+    ]
+
+
+def test_ros1_definitions_are_less_strict() -> None:
+    message = parse_msg("  float64[9] K\n\tstring childFrame", FOO, "Foo.msg", ros1_names=True)
+    assert message.fields == (Field("K", ArrayType(DOUBLE, 9)), Field("childFrame", STRING))
+
+
+# Where this reader and ROS 2's tools differ on purpose
+
+DIFFERENCES: list[tuple[str, list[object], bool]] = [
+    # `rosidl_parser` loses the sign of an infinity.
+    ("float64 x -inf", [-math.inf, (), None], True),
+    # A backslash in a comment is an escape sequence for `rosidl_adapter`, or an error. It does not change the type.
+    (r"int8 x # a\tb", [None, (r"a\tb",), None], True),
+    (r"int8 x # C:\new", [None, (r"C:\new",), None], False),
+    ("int8 x # goes on \\", [None, ("goes on \\",), None], False),
+]
+
+
+@pytest.mark.parametrize(("text", "expected", "accepted"), DIFFERENCES, ids=[row[0] for row in DIFFERENCES])
+def test_differences(text: str, expected: list[object], accepted: bool, tmp_path: Path) -> None:
+    message = parse_message(text)
+    (field,) = message.fields
+    assert [field.default, field.comment, field.unit] == expected
+    theirs = official(text, FOO, tmp_path)
+    assert (theirs is not None) == accepted
+    if theirs is not None:
+        assert facts(message) != facts(theirs)
+
+
+# Services and actions
+
+A, B, C = Field("a", INT8), Field("b", INT8), Field("c", INT8)
+
+
+@pytest.mark.parametrize(
+    ("text", "request_fields", "response_fields"),
+    [
+        ("int8 a\n---\nint8 b", (A,), (B,)),
+        ("int8 a\r\n---\r\nint8 b\r\n", (A,), (B,)),
+        ("---\nint8 b", EMPTY, (B,)),
+        ("int8 a\n---", (A,), EMPTY),
+        ("---", EMPTY, EMPTY),
+        ("\n---\n", EMPTY, EMPTY),
+        ("# ---\n---\n# ---", EMPTY, EMPTY),
+        ("int8 a\n---\nint8 a", (A,), (A,)),
+    ],
+)
+def test_services(
+    text: str, request_fields: tuple[Field, ...], response_fields: tuple[Field, ...], tmp_path: Path
+) -> None:
+    service = parse(text, DO)
+    assert service == Service(
+        DO,
+        Message(DO.sibling("_Request"), request_fields),
+        Message(DO.sibling("_Response"), response_fields),
+    )
+    assert isinstance(service, Service)
+    assert service.text == text
+    theirs = official(text, DO, tmp_path)
+    assert theirs is not None
+    assert facts(service) == facts(theirs)
+
+
+@pytest.mark.parametrize(
+    ("text", "fields"),
+    [
+        ("int8 a\n---\nint8 b\n---\nint8 c", [(A,), (B,), (C,)]),
+        ("---\n---", [EMPTY, EMPTY, EMPTY]),
+        ("---\nint8 b\n---\n", [EMPTY, (B,), EMPTY]),
+    ],
+)
+def test_actions(text: str, fields: list[tuple[Field, ...]], tmp_path: Path) -> None:
+    action = parse(text, GO)
+    messages = (
+        Message(GO.sibling(suffix), each)
+        for suffix, each in zip(("_Goal", "_Result", "_Feedback"), fields, strict=True)
+    )
+    assert action == Action(GO, *messages)
+    assert isinstance(action, Action)
+    assert action.text == text
+    theirs = official(text, GO, tmp_path)
+    assert theirs is not None
+    assert facts(action) == facts(theirs)
+
+
+def test_comments_and_constants_of_the_parts(tmp_path: Path) -> None:
+    text = """# request
+# [s]
+
+# first
+int8 A=1 # [m]
+int8 a
+# last
+---
+# response
+int8 A=2
+int8 b # [s]
+  # more
+"""
+    service = parse(text, DO)
+    assert isinstance(service, Service)
+    request, response = service.request, service.response
+    assert (request.comment, response.comment) == (("request", "[s]", "", "last"), ("response",))
+    assert request.constants == (Constant("A", INT8, 1),)
+    assert (request.constants[0].comment, request.constants[0].unit) == (("first",), "m")
+    assert response.constants == (Constant("A", INT8, 2),)
+    assert (response.fields[0].comment, response.fields[0].unit) == (("more",), "s")
+    assert response.fields[0].location == Location("Do.srv", 11, 6)
+    theirs = official(text, DO, tmp_path)
+    assert theirs is not None
+    assert facts(service) == facts(theirs)
+
+
+# Errors
+
