@@ -369,9 +369,9 @@ def boolean(value: Any) -> bool:
     raise TypeError(f"expected bool, not {value!r}")
 
 
-def octet(value: bytes) -> int:
-    """Return the number of a ROS octet, which is a single byte in Python."""
-    return ord(value)
+def octet(value: bytes | int) -> int:
+    """Return the number of a ROS octet, which is a single byte in Python; some libraries have a number already."""
+    return ord(value) if isinstance(value, bytes) else in_range(value, 0, 0xFF)
 
 
 def ros_octet(value: int) -> bytes:
@@ -379,7 +379,7 @@ def ros_octet(value: int) -> bytes:
     return bytes((in_range(value, 0, 0xFF),))
 
 
-def octets(values: Sequence[bytes]) -> bytes:
+def octets(values: Sequence[bytes | int]) -> bytes:
     """Return ROS octets, each a single byte in Python, as one bytes object."""
     if isinstance(values, (bytes, bytearray, memoryview)):
         return bytes(values)

@@ -34,7 +34,7 @@ def value(field, number):
             return f"text {number}"[: detail[1] or None]
         return detail[0] == "bool" or (number + 0.5 if detail[0].startswith("float") else number)
     element, size = detail
-    values = [value(element, number + each) for each in range(size if kind.name == "ARRAY" else 2)]
+    values = [value(element, number + each) for each in range(size if kind.name == "ARRAY" else min(2, size or 2))]
     scalar = element[0].name == "BASE" and element[1][0] not in ("string", "wstring")
     dtype = {"byte": "uint8", "char": "uint8"}.get(element[1][0], element[1][0]) if scalar else None
     return numpy.array(values, dtype=dtype) if scalar else values
@@ -44,25 +44,25 @@ def message(name):
     return types.types[name](**{each: value(field, index) for index, (each, field) in enumerate(fields)})
 
 def check(ros, custom, path):
-    for field in dataclasses.fields(ros):
-        if field.name in ("__msgtype__", "structure_needs_at_least_one_member"):
+    for name, _ in types.fielddefs[ros.__msgtype__][1]:
+        if name == "structure_needs_at_least_one_member":
             continue
-        expected, found = getattr(ros, field.name), getattr(custom, field.name)
+        expected, found = getattr(ros, name), getattr(custom, name)
         if dataclasses.is_dataclass(expected):
-            check(expected, found, f"{path}.{field.name}")
+            check(expected, found, f"{path}.{name}")
         elif isinstance(expected, list) and expected and dataclasses.is_dataclass(expected[0]):
             assert len(expected) == len(found), path
             for one, other in zip(expected, found):
-                check(one, other, f"{path}.{field.name}")
+                check(one, other, f"{path}.{name}")
         elif hasattr(expected, "tolist"):
             if isinstance(found, bytes):
-                assert expected.tobytes() == found, f"{path}.{field.name}"
+                assert expected.tobytes() == found, f"{path}.{name}"
             else:
-                assert expected.tolist() == list(found), f"{path}.{field.name}"
+                assert expected.tolist() == list(found), f"{path}.{name}"
         elif isinstance(found, bytes):
-            assert expected == found.decode("utf-16-le"), f"{path}.{field.name}"
+            assert expected == found.decode("utf-16-le"), f"{path}.{name}"
         else:
-            assert expected == found, f"{path}.{field.name}"
+            assert expected == found, f"{path}.{name}"
 
 for name in types.fielddefs:
     package, namespace, short = name.split("/")

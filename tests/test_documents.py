@@ -1,0 +1,57 @@
+"""Every command and example in the documents runs."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+NEEDS_ROS = re.compile(r"convert_to_ros_message\(\w+\)  #|import rclpy")
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Generated packages, which the Python examples import as if they were installed."""
+    folder = tmp_path_factory.mktemp("installed")
+    run(folder, folder, "sh", "rosidl-proto generate sensor_msgs")
+    return folder
+
+
+def run(folder: Path, installed: Path, kind: str, text: str) -> None:
+    text = re.sub(r"^pip install \./generated$", "", text, flags=re.MULTILINE)
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    python_path = os.pathsep.join([str(installed / "generated/python"), str(ROOT)])
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": python_path}
+    command = ["bash", "-euc", text] if kind == "sh" else [sys.executable, "-c", text]
+    process = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, check=False, text=True
+    )
+    assert process.returncode == 0, f"{text}\n{process.stdout}\n{process.stderr}"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_blocks_run(document: Path, installed: Path, tmp_path: Path) -> None:
+    for kind, text in BLOCK.findall(document.read_text(encoding="utf-8")):
+        if NEEDS_ROS.search(text):
+            pytest.importorskip("rclpy", reason="needs a ROS installation")
+        run(tmp_path, installed, kind, text)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(document: Path) -> None:
+    for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8")):
+        assert (document.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("example", ["without_ros.py", "with_ros.py"])
+def test_examples_run(example: str, installed: Path, tmp_path: Path) -> None:
+    if example == "with_ros.py":
+        pytest.importorskip("rclpy", reason="needs a ROS installation")
+    run(tmp_path, installed, "python", (ROOT / "examples" / example).read_text())
