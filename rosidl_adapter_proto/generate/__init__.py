@@ -238,7 +238,7 @@ def _fingerprint(
     The closure of a request follows from the text of what is in it and from what else its packages have: as long as
     these are the same, nothing needs to be parsed.
     """
-    names = sorted(names)
+    names = sorted({*names, *_IN_EVERY_SERVICE})
     packages = {name.package: sorted(map(str, sources.packages.get(name.package, ()))) for name in names}
     known = [name for name in names if name in sources.packages.get(name.package, ())]
     content = {
@@ -250,6 +250,13 @@ def _fingerprint(
         "definitions": {str(name): digest(sources.definition(name).text.encode()) for name in known},
     }
     return digest(json.dumps(content).encode())
+
+
+_IN_EVERY_SERVICE = (
+    TypeName("service_msgs", "msg", "ServiceEventInfo"),
+    TypeName("builtin_interfaces", "msg", "Time"),
+)
+"""The type hash of a service covers its `_Event`, even where that is not generated."""
 
 
 def _tool_digest() -> str:

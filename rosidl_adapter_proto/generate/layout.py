@@ -52,21 +52,30 @@ class Changes:
 
 
 def check_ours(output: Path) -> None:
-    """Check that a folder is empty or was made by us.
+    """Check that a folder has no files or was made by us.
 
     Raises:
         GenerateError: It is neither.
     """
     try:
-        present = {each.name for each in output.iterdir()} - {STAGING_NAME} if output.exists() else set()
+        if output.exists() and read_manifest(output) is None and _has_files(output):
+            raise GenerateError(
+                f"{output} has files that were not made by rosidl-proto; "
+                "choose an empty or new folder with --output"
+            )
     except NotADirectoryError:
         raise GenerateError(f"{output} is not a folder; choose another with --output") from None
     except OSError as error:
         raise GenerateError(f"cannot read {output}: {error.strerror}") from None
-    if present and read_manifest(output) is None:
-        raise GenerateError(
-            f"{output} has files that were not made by rosidl-proto; choose an empty or new folder with --output"
-        )
+
+
+def _has_files(output: Path) -> bool:
+    """Tell whether there are files. A run that was killed may leave empty folders, and what it had staged."""
+    return any(
+        not each.is_dir() or each.is_symlink() or _has_files(each)
+        for each in output.iterdir()
+        if each.name != STAGING_NAME
+    )
 
 
 def make_manifest(fingerprint: str, interfaces: Iterable[TypeName], files: Mapping[str, bytes]) -> Manifest:

@@ -9,7 +9,7 @@ import ast
 import re
 import textwrap
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from rosidl_adapter_proto.errors import DefinitionError
@@ -74,7 +74,7 @@ _ROS1_FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _DERIVED_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
 
 _TYPE = re.compile(r"(?P<element>[^\[\]]*)(\[(?P<upper_bound><=)?(?P<size>[^\[\]]*)\])?")
-_UNIT = re.compile(r"(\s*\[([^,\]]+)\])")  # no comma: [0, 1] is a range
+_UP_TO_BRACKET_OR_COMMA = re.compile(r"([^,\]]*)([,\]]?)")
 # A string inside the quotes of an .idl file, and its escape sequences as `rosidl_parser` knows them (table 7-9).
 _IDL_STRING = re.compile(r"""([^"\\\n\r]|\\[^\n\r])*""")
 _IDL_ESCAPE = re.compile(r"""\\(?:([ntvbrfa\\'"])|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))""")
@@ -115,21 +115,32 @@ def _parse_sections(text: str, name: TypeName, file: str, suffixes: tuple[str, .
     separators = [index for index, line in enumerate(lines) if line == _SEPARATOR]
     expected = len(suffixes) - 1
     if len(separators) != expected:
-        # Point at the first separator too many, or at the end where one is missing.
-        line = separators[expected] + 1 if len(separators) > expected else max(len(lines), 1)
-        parts = ", ".join(suffix[1:].lower() for suffix in suffixes)
-        raise problem(
-            f"expected {expected} line{'s' * (expected > 1)} '{_SEPARATOR}' between {parts}, "
-            f"found {len(separators)}",
-            "\n".join(lines),
-            Location(file, line),
-        )
+        raise _separator_problem(lines, separators, file, [suffix[1:].lower() for suffix in suffixes])
     starts = [0, *(index + 1 for index in separators)]
     ends = [*separators, len(lines)]
     return [
         _MessageReader(text, name.sibling(suffix), file).read(start, end)
         for suffix, start, end in zip(suffixes, starts, ends, strict=True)
     ]
+
+
+def _separator_problem(
+    lines: list[str], separators: list[int], file: str, parts: list[str]
+) -> DefinitionError:
+    expected = len(parts) - 1
+    like_separators = [index for index, line in enumerate(lines) if line.strip() == _SEPARATOR != line]
+    if len(separators) > expected:
+        line = separators[expected]
+    elif like_separators:
+        line = like_separators[0]
+    else:
+        line = max(len(lines) - 1, 0)
+    hint = "; such a line has nothing else on it, spaces included" if like_separators else ""
+    message = (
+        f"expected {expected} line{'s' * (expected > 1)} '{_SEPARATOR}', between "
+        f"{', '.join(parts[:-1])} and {parts[-1]}, found {len(separators)}{hint}"
+    )
+    return problem(message, "\n".join(lines), Location(file, line + 1))
 
 
 class _MessageReader:
@@ -340,7 +351,7 @@ class _MessageReader:
             seen[element.name] = element.location
 
     def _bad_name(self, kind: str, name: str, location: Location) -> DefinitionError:
-        return self._problem(f"{name!r} is not a valid {kind} name; {_NAME_ADVICE[kind]}", location)
+        return self._problem(f"{_quoted(name)} is not a valid {kind} name; {_NAME_ADVICE[kind]}", location)
 
     def _problem(self, message: str, location: Location) -> DefinitionError:
         return problem(message, "\n".join(self.lines), location)
@@ -526,11 +537,19 @@ _ESCAPED_CHARACTERS = dict(zip("ntvbrfa", "\n\t\v\b\r\f\a", strict=True))
 
 
 def _comment_and_unit(lines: list[str]) -> tuple[tuple[str, ...], str | None]:
-    units = _UNIT.findall("\n".join(lines))
+    units = list(_units("\n".join(lines)))
     if len(units) != 1:
         return _tidy(lines), None
     marked, unit = units[0]
     return _tidy([line.replace(marked, "") for line in lines]), unit
+
+
+def _units(comment: str) -> Iterator[tuple[str, str]]:
+    """Yield what stands in brackets, with them and the space before, and alone; but not `[0, 1]`, which is a range."""
+    for part, end in _UP_TO_BRACKET_OR_COMMA.findall(comment):
+        before, _, unit = part.partition("[")
+        if unit and end == "]":
+            yield f"{before[len(before.rstrip()):]}[{unit}]", unit
 
 
 def _tidy(lines: list[str]) -> tuple[str, ...]:

@@ -18,7 +18,6 @@ from rosidl_adapter_proto.interfaces.model import (
     BasicType,
     Constant,
     Field,
-    FieldType,
     Interface,
     Location,
     Message,
@@ -36,7 +35,7 @@ DO = TypeName("pkg", "srv", "Do")
 GO = TypeName("pkg", "action", "Go")
 BOOL, BYTE, UINT8, INT8, UINT16, INT32, INT64, UINT64, FLOAT, DOUBLE = (
     BasicType(name)
-    for name in "boolean octet uint8 int8 uint16 int32 int64 uint64 float double".split()
+    for name in ("boolean", "octet", "uint8", "int8", "uint16", "int32", "int64", "uint64", "float", "double")
 )
 STRING, WSTRING = StringType(), StringType(wide=True)
 EMPTY = (Field(EMPTY_STRUCT_FIELD, UINT8),)
@@ -135,7 +134,10 @@ FIELDS: list[tuple[str, Field]] = [
         }.items()
     ),
     # Names
-    *((f"string {name}", Field(name, STRING)) for name in "module string int8 x1 a_b_c x_1 default".split()),
+    *(
+        (f"string {name}", Field(name, STRING))
+        for name in ("module", "string", "int8", "x1", "a_b_c", "x_1", "default")
+    ),
     (f"int8 {EMPTY_STRUCT_FIELD}", Field(EMPTY_STRUCT_FIELD, INT8)),
     # White space
     ("int32\tx\t5", Field("x", INT32, 5)),
@@ -158,8 +160,8 @@ FIELDS: list[tuple[str, Field]] = [
     ("byte x 0xff", Field("x", BYTE, 255)),
     ("char x 65", Field("x", UINT8, 65)),
     # Booleans
-    *((f"bool x {text}", Field("x", BOOL, True)) for text in "true True TRUE tRuE 1".split()),
-    *((f"bool x {text}", Field("x", BOOL, False)) for text in "false False FALSE fAlSe 0".split()),
+    *((f"bool x {text}", Field("x", BOOL, True)) for text in ("true", "True", "TRUE", "tRuE", "1")),
+    *((f"bool x {text}", Field("x", BOOL, False)) for text in ("false", "False", "FALSE", "fAlSe", "0")),
     # Numbers
     ("float32 x 1", Field("x", FLOAT, 1.0)),
     ("float64 x .5", Field("x", DOUBLE, 0.5)),
@@ -183,7 +185,7 @@ FIELDS: list[tuple[str, Field]] = [
     ('string x "', Field("x", STRING, "")),
     ('string x "a', Field("x", STRING, '"a')),
     ("string x a'", Field("x", STRING, "a'")),
-    ("string x \"it's\"", Field("x", STRING, "it's")),
+    ('string x "it\'s"', Field("x", STRING, "it's")),
     (r"string x 'it\'s'", Field("x", STRING, "it's")),
     (r'string x "say \"a\""', Field("x", STRING, 'say "a"')),
     ('string x "say "', Field("x", STRING, "say ")),
@@ -227,7 +229,7 @@ FIELDS: list[tuple[str, Field]] = [
     ("float32[2] x [1, -2.5e3]", Field("x", ArrayType(FLOAT, 2), (1.0, -2500.0))),
     ("string[] x []", Field("x", SequenceType(STRING), ())),
     ("string[] x [a b, c]", Field("x", SequenceType(STRING), ("a b", "c"))),
-    ('string[] x ["a, b", \'c\']', Field("x", SequenceType(STRING), ("a, b", "c"))),
+    ("string[] x [\"a, b\", 'c']", Field("x", SequenceType(STRING), ("a, b", "c"))),
     ('string[] x ["a",]', Field("x", SequenceType(STRING), ("a",))),
     ('string[] x ["a" "b"]', Field("x", SequenceType(STRING), ("a", "b"))),
     ("string[] x ['''a''']", Field("x", SequenceType(STRING), ("", "a", ""))),
@@ -475,7 +477,7 @@ int8 b # [s]
     request, response = service.request, service.response
     assert (request.comment, response.comment) == (("request", "[s]", "", "last"), ("response",))
     assert request.constants == (Constant("A", INT8, 1),)
-    assert (request.constants[0].comment, request.constants[0].unit) == (("first",), "m")
+    assert (request.constants[0].comment, request.constants[0].unit) == (("first", "[m]"), "m")
     assert response.constants == (Constant("A", INT8, 2),)
     assert (response.fields[0].comment, response.fields[0].unit) == (("more",), "s")
     assert response.fields[0].location == Location("Do.srv", 11, 6)
@@ -486,3 +488,407 @@ int8 b # [s]
 
 # Errors
 
+LOWER = "use lower case letters, digits and single underscores, beginning with a letter"
+UPPER = "use upper case letters, digits and single underscores, beginning with a letter"
+CAMEL = "use letters and digits, beginning with an upper case letter"
+EQUALS = (
+    "a line with '=' defines a constant, and its name has no spaces; "
+    "the default value of a field is written without '=' and cannot contain one"
+)
+BROKEN = (
+    r"ROS 2 replaces escape sequences twice, and the string is broken after the "
+    r"first time; double each backslash: \\n is a line break, \\\\ a backslash"
+)
+ESCAPES = (
+    r"ROS 2 cannot read the escape sequences of this string; write "
+    r"characters as they are, in UTF-8, and a backslash as \\\\"
+)
+ARRAY = (
+    "ROS 2 cannot read this default of an array; "
+    "it takes finite numbers, and strings without quotes and backslashes"
+)
+ALONE = (
+    "expected 1 line '---', between request and response, found 0; "
+    "such a line has nothing else on it, spaces included"
+)
+
+# Each row: what is defined, the text, line and column of the error, its message
+ERRORS: list[tuple[TypeName, str, str, str]] = [
+    (FOO, "int32", "1:1", "expected a type and a name, found only 'int32'"),
+    (FOO, "int32  # only a type", "1:1", "expected a type and a name, found only 'int32'"),
+    (
+        FOO,
+        " int32 x",
+        "1:2",
+        "ROS 2 does not accept an indented field or constant; begin it in the first column",
+    ),
+    (
+        FOO,
+        "\tint32 x",
+        "1:2",
+        "ROS 2 does not accept an indented field or constant; begin it in the first column",
+    ),
+    (
+        FOO,
+        "int32 x\n  int32 y",
+        "2:3",
+        "ROS 2 does not accept an indented field or constant; begin it in the first column",
+    ),
+    (FOO, "---", "1:1", "expected a type and a name, found only '---'"),
+    (FOO, "int32\tX", "1:7", f"'X' is not a valid field name; {LOWER}"),
+    (FOO, "int32 xY", "1:7", f"'xY' is not a valid field name; {LOWER}"),
+    (FOO, "int32 x_", "1:7", f"'x_' is not a valid field name; {LOWER}"),
+    (FOO, "int32 x__y", "1:7", f"'x__y' is not a valid field name; {LOWER}"),
+    (FOO, "int32 _x", "1:7", f"'_x' is not a valid field name; {LOWER}"),
+    (FOO, "int32 1x", "1:7", f"'1x' is not a valid field name; {LOWER}"),
+    (FOO, "int32 x-y", "1:7", f"'x-y' is not a valid field name; {LOWER}"),
+    (FOO, "int32 é", "1:7", f"'é' is not a valid field name; {LOWER}"),
+    (FOO, "int32[] x\nstring x", "2:8", "'x' is defined twice, first in line 1"),
+    (FOO, "int32 A=1\nint32 B=2\nint8 A=3", "3:6", "'A' is defined twice, first in line 1"),
+    (FOO, "int32 a=1", "1:7", f"'a' is not a valid constant name; {UPPER}"),
+    (FOO, "int32 Aa=1", "1:7", f"'Aa' is not a valid constant name; {UPPER}"),
+    (FOO, "int32 A_=1", "1:7", f"'A_' is not a valid constant name; {UPPER}"),
+    (FOO, "int32 A__B=1", "1:7", f"'A__B' is not a valid constant name; {UPPER}"),
+    (FOO, "int32 =1", "1:7", "expected the name of a constant before '='"),
+    (
+        FOO,
+        "int32 x 5 = 3",
+        "1:7",
+        EQUALS,
+    ),
+    (
+        FOO,
+        'string x "a=b"',
+        "1:8",
+        EQUALS,
+    ),
+    (
+        FOO,
+        "string<=5 X=a",
+        "1:1",
+        "a constant cannot be of type 'string<=5'; use a number, bool, string or wstring",
+    ),
+    (
+        FOO,
+        "int32[] X=[1]",
+        "1:1",
+        "a constant cannot be of type 'int32[]'; use a number, bool, string or wstring",
+    ),
+    (FOO, "Foo X=1", "1:1", "a constant cannot be of type 'Foo'; use a number, bool, string or wstring"),
+    (
+        FOO,
+        "bar/Foo X=1",
+        "1:1",
+        "a constant cannot be of type 'bar/Foo'; use a number, bool, string or wstring",
+    ),
+    (FOO, "foo x", "1:1", f"'foo' is neither a primitive type nor the name of a message; {CAMEL}"),
+    (FOO, "double x", "1:1", "'double' is not a type in .msg; use float64"),
+    (FOO, "uint[] x", "1:1", "'uint' is not a type in .msg; use uint32 or uint64"),
+    (
+        FOO,
+        "foo/Bar/Baz x",
+        "1:1",
+        f"'foo/Bar/Baz' is not a type: 'foo/Bar' is not a valid package name; {LOWER}",
+    ),
+    (FOO, "Foo_bar x", "1:1", f"'Foo_bar' is neither a primitive type nor the name of a message; {CAMEL}"),
+    (FOO, "foo_/Bar x", "1:1", f"'foo_/Bar' is not a type: 'foo_' is not a valid package name; {LOWER}"),
+    (FOO, "Foo/Bar x", "1:1", f"'Foo/Bar' is not a type: 'Foo' is not a valid package name; {LOWER}"),
+    (FOO, "/Bar x", "1:1", f"'/Bar' is not a type: '' is not a valid package name; {LOWER}"),
+    (FOO, "foo/ x", "1:1", f"'foo/' is neither a primitive type nor the name of a message; {CAMEL}"),
+    (
+        FOO,
+        "std_msgs/msg/Header x",
+        "1:1",
+        "'std_msgs/msg/Header' is not written with '/msg/' in .msg; use std_msgs/Header",
+    ),
+    (FOO, "time x", "1:1", "'time' is a ROS 1 type; use builtin_interfaces/Time"),
+    (FOO, "duration[] x", "1:1", "'duration' is a ROS 1 type; use builtin_interfaces/Duration"),
+    (FOO, "int32[ x", "1:1", "'int32[' is not a type; arrays have one pair of brackets"),
+    (FOO, "int32] x", "1:1", "'int32]' is not a type; arrays have one pair of brackets"),
+    (FOO, "int32[3][4] x", "1:1", "'int32[3][4]' is not a type; arrays have one pair of brackets"),
+    (FOO, "int32[]3 x", "1:1", "'int32[]3' is not a type; arrays have one pair of brackets"),
+    (FOO, "int32[0] x", "1:1", "the size of array type 'int32[0]' must be a whole number above 0, not '0'"),
+    (
+        FOO,
+        "int32[-1] x",
+        "1:1",
+        "the size of array type 'int32[-1]' must be a whole number above 0, not '-1'",
+    ),
+    (
+        FOO,
+        "int32[<=0] x",
+        "1:1",
+        "the size of array type 'int32[<=0]' must be a whole number above 0, not '0'",
+    ),
+    (FOO, "int32[<=] x", "1:1", "the size of array type 'int32[<=]' must be a whole number above 0, not ''"),
+    (
+        FOO,
+        "int32[<5] x",
+        "1:1",
+        "the size of array type 'int32[<5]' must be a whole number above 0, not '<5'",
+    ),
+    (FOO, "int32[n] x", "1:1", "the size of array type 'int32[n]' must be a whole number above 0, not 'n'"),
+    (FOO, "string<=0 x", "1:1", "the bound of 'string<=0' must be a whole number above 0, not '0'"),
+    (FOO, "string<=x y", "1:1", "the bound of 'string<=x' must be a whole number above 0, not 'x'"),
+    (FOO, "string<= y", "1:1", "the bound of 'string<=' must be a whole number above 0, not ''"),
+    (FOO, "string<5 x", "1:1", f"'string<5' is neither a primitive type nor the name of a message; {CAMEL}"),
+    (FOO, "wstring<=-1 x", "1:1", "the bound of 'wstring<=-1' must be a whole number above 0, not '-1'"),
+    (FOO, "int8 x 128", "1:8", "'128' does not fit int8, which goes from -128 to 127"),
+    (FOO, "int8 x -129", "1:8", "'-129' does not fit int8, which goes from -128 to 127"),
+    (FOO, "uint8 X=256", "1:9", "'256' does not fit uint8, which goes from 0 to 255"),
+    (FOO, "uint16 x -1", "1:10", "'-1' does not fit uint16, which goes from 0 to 65535"),
+    (FOO, "int32 x 1.0", "1:9", "expected a whole number from -2147483648 to 2147483647, not '1.0'"),
+    (FOO, "int32 x 0x", "1:9", "expected a whole number from -2147483648 to 2147483647, not '0x'"),
+    (FOO, "int32 x ten", "1:9", "expected a whole number from -2147483648 to 2147483647, not 'ten'"),
+    (FOO, "int32 X=", "1:9", "expected a whole number from -2147483648 to 2147483647, not ''"),
+    (FOO, "int32 x 1 2", "1:9", "expected a whole number from -2147483648 to 2147483647, not '1 2'"),
+    (
+        FOO,
+        "uint64 X=18446744073709551616",
+        "1:10",
+        "'18446744073709551616' does not fit uint64, which goes from 0 to 18446744073709551615",
+    ),
+    (FOO, "byte x -1", "1:8", "'-1' does not fit byte, which goes from 0 to 255"),
+    (FOO, "byte x a", "1:8", "expected a whole number from 0 to 255, not 'a'"),
+    (FOO, "char X='a'", "1:8", "expected a whole number from 0 to 255, not \"'a'\""),
+    (FOO, "bool x yes", "1:8", "a bool must be true, false, 1 or 0, not 'yes'"),
+    (FOO, "bool X=2", "1:8", "a bool must be true, false, 1 or 0, not '2'"),
+    (FOO, "float32 x 1,5", "1:11", "expected a number with '.' as its decimal point, not '1,5'"),
+    (FOO, "float64 X=pi", "1:11", "expected a number with '.' as its decimal point, not 'pi'"),
+    (FOO, "float64 x 0x10", "1:11", "expected a number with '.' as its decimal point, not '0x10'"),
+    (FOO, "Foo x 1", "1:7", "a field that is a message cannot have a default value"),
+    (FOO, "Foo[] x []", "1:9", "a field that is a message cannot have a default value"),
+    (FOO, "int32[] x 1", "1:11", "the default of an array must stand in brackets, not '1'"),
+    (FOO, "int32[] x [1", "1:11", "the default of an array must stand in brackets, not '[1'"),
+    (FOO, "int32[] x [", "1:11", "the default of an array must stand in brackets, not '['"),
+    (FOO, "int32[2] x [1]", "1:12", "the default of an array of 2 must have 2 elements, not 1"),
+    (FOO, "int32[<=2] x [1, 2, 3]", "1:14", "the default of a sequence of at most 2 cannot have 3 elements"),
+    (FOO, "int32[] x [1, a]", "1:11", "expected a whole number from -2147483648 to 2147483647, not 'a'"),
+    (FOO, "int32[] x [1,]", "1:11", "expected a whole number from -2147483648 to 2147483647, not ''"),
+    (
+        FOO,
+        "int32[] x [1, 300000000000]",
+        "1:11",
+        "'300000000000' does not fit int32, which goes from -2147483648 to 2147483647",
+    ),
+    (FOO, "bool[] x [maybe]", "1:10", "a bool must be true, false, 1 or 0, not 'maybe'"),
+    (
+        FOO,
+        "float64[] x [nan]",
+        "1:13",
+        ARRAY,
+    ),
+    (
+        FOO,
+        "float64[1] x [-inf]",
+        "1:14",
+        ARRAY,
+    ),
+    (FOO, "string<=3 x abcd", "1:13", "the string has 4 characters, more than its bound of 3"),
+    (FOO, 'string<=3[] x ["abcd"]', "1:15", "the string has 4 characters, more than its bound of 3"),
+    (FOO, 'string x "a"b"', "1:10", r"a quote inside a string must be written \""),
+    (FOO, "string X='it's'", "1:10", r"a quote inside a string must be written \'"),
+    (
+        FOO,
+        r'string x "a\nb"',
+        "1:10",
+        BROKEN,
+    ),
+    (
+        FOO,
+        r'string x "\u00f6"',
+        "1:10",
+        ESCAPES,
+    ),
+    (
+        FOO,
+        "string X=a\\",
+        "1:10",
+        ESCAPES,
+    ),
+    (
+        FOO,
+        r"string X=\xq",
+        "1:10",
+        ESCAPES,
+    ),
+    (FOO, r"string X=\\x4", "1:10", r"an escape sequence '\x' has two digits, not only '4'"),
+    (FOO, "string[] x [,]", "1:12", "expected a string before ',' or ']'"),
+    (FOO, "string[] x [a,,b]", "1:12", "expected a string before ',' or ']'"),
+    (FOO, "string[] x [ ]", "1:12", "expected a string before ',' or ']'"),
+    (FOO, 'string[] x ["a", ]', "1:12", "expected a string before ',' or ']'"),
+    (FOO, 'string[] x ["a]', "1:12", 'a string has no closing "'),
+    (
+        FOO,
+        'string[] x ["ö"]',
+        "1:12",
+        "ROS 2 only reads ASCII characters in the default of an array of strings",
+    ),
+    (FOO, "string[] x ['\"\\\\']", "1:12", "a string has no closing '"),
+    (
+        FOO,
+        "int32 x " + "9" * 100,
+        "1:9",
+        f"'{'9' * 60}'... does not fit int32, which goes from -2147483648 to 2147483647",
+    ),
+    (
+        FOO,
+        "int32 " + "x" * 300 + "é",
+        "1:7",
+        f"'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx'... is not a valid field name; {LOWER}",
+    ),
+    (FOO, "int8 a\rint8 a", "2:6", "'a' is defined twice, first in line 1"),
+    (FOO, "int32 X\t=\t\tten", "1:12", "expected a whole number from -2147483648 to 2147483647, not 'ten'"),
+    (DO, "", "1:1", "expected 1 line '---', between request and response, found 0"),
+    (
+        DO,
+        "int8 a\n--- \nint8 b",
+        "2:1",
+        ALONE,
+    ),
+    (
+        DO,
+        "int8 a\n ---\n",
+        "2:1",
+        ALONE,
+    ),
+    (DO, "---\n---", "2:1", "expected 1 line '---', between request and response, found 2"),
+    (
+        DO,
+        "int8 a\n---\nint8 b\n---\nint8 c\n---",
+        "4:1",
+        "expected 1 line '---', between request and response, found 3",
+    ),
+    (DO, "int8 a\n---\nint8 b\nint8 b", "4:6", "'b' is defined twice, first in line 3"),
+    (DO, "int8 a\n----\nint8 b", "3:1", "expected 1 line '---', between request and response, found 0"),
+    (GO, "", "1:1", "expected 2 lines '---', between goal, result and feedback, found 0"),
+    (GO, "int8 a\n---\nint8 b", "3:1", "expected 2 lines '---', between goal, result and feedback, found 1"),
+    (GO, "---\n---\n---", "3:1", "expected 2 lines '---', between goal, result and feedback, found 3"),
+    (GO, "---\n\n---\nint8 A", "4:6", f"'A' is not a valid field name; {LOWER}"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "place", "message"), ERRORS, ids=[f"{row[0].name}: {row[1][:50]!r}" for row in ERRORS]
+)
+def test_errors(name: TypeName, text: str, place: str, message: str, tmp_path: Path) -> None:
+    first_line, *_ = error_of(text, name).split("\n")
+    assert first_line == f"{name.name}.{name.namespace}:{place}: {message}"
+    assert official(text, name, tmp_path) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        (
+            "# file\n\nint8 a\nint8 b 128 # too large",
+            "Foo.msg:4:8: '128' does not fit int8, which goes from -128 to 127\n"
+            "  int8 b 128 # too large\n"
+            "         ^",
+        ),
+        (
+            "int8\t\t1a\r\n",
+            f"Foo.msg:1:7: '1a' is not a valid field name; {LOWER}\n  int8\t\t1a\n      \t\t^",
+        ),
+        (
+            "int8 a\fint8 b\rint8 a",
+            "Foo.msg:3:6: 'a' is defined twice, first in line 1\n  int8 a\n       ^",
+        ),
+    ],
+)
+def test_errors_show_the_line(text: str, error: str) -> None:
+    assert error_of(text) == error
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        (TypeName("pkg", "msg", "foo"), f"foo.msg: 'foo' is not a valid message name; {CAMEL}"),
+        (TypeName("pkg", "msg", "My_Foo"), f"My_Foo.msg: 'My_Foo' is not a valid message name; {CAMEL}"),
+        (TypeName("pkg", "srv", "do"), f"do.srv: 'do' is not a valid message name; {CAMEL}"),
+        (TypeName("Pkg", "msg", "Foo"), f"Foo.msg: 'Pkg' is not a valid package name; {LOWER}"),
+        (TypeName("my-pkg", "msg", "Foo"), f"Foo.msg: 'my-pkg' is not a valid package name; {LOWER}"),
+        (TypeName("pkg_", "action", "Go"), f"Go.action: 'pkg_' is not a valid package name; {LOWER}"),
+    ],
+    ids=str,
+)
+def test_names_that_are_not_valid(name: TypeName, error: str, tmp_path: Path) -> None:
+    text = "---\n" * {"msg": 0, "srv": 1, "action": 2}[name.namespace]
+    assert error_of(text, name) == error
+    assert official(text, name, tmp_path) is None
+
+
+# Garbage
+
+FRAGMENTS = (
+    *("int8", "bool", "string", "wstring<=3", "float64", "Foo", "a/B", "[]", "[3]", "[<=2]", "x", "y_1"),
+    *("X", "=", "1", "-5", "true", "nan", "0x1F", "a,b", "[1,2]", "---", "\\", "\\n"),
+    *" \t\n\r\f#\"'[]=,",
+    "é",
+    "\u2028",
+    "\ufeff",
+    "\x00",
+    "['a', \"b\"]",
+    '"a\\"b"',
+)
+GARBAGE = st.one_of(
+    st.text(max_size=80),
+    st.lists(st.sampled_from(FRAGMENTS), max_size=30).map("".join),
+    st.lists(st.sampled_from(FRAGMENTS), max_size=30).map(" ".join),
+)
+SAMPLES = (
+    [text for text, _ in FIELDS] + [text for text, _ in CONSTANTS] + ["int8 a\n---\nint8 b\n---\nint8 c"]
+)
+
+
+def read_or_refuse(text: str) -> None:
+    """Check that each reader gives a model, or the error for definitions."""
+    for name in (FOO, DO, GO):
+        try:
+            interface = parse(text, name)
+        except DefinitionError as error:
+            assert str(error).startswith(f"{name.name}.{name.namespace}:")
+            continue
+        assert interface.name == name
+        for message in parts(interface):
+            assert message.fields
+            hash(message)
+
+
+@given(GARBAGE)
+@settings(max_examples=1000, deadline=None)
+def test_garbage(text: str) -> None:
+    read_or_refuse(text)
+
+
+@given(st.randoms(use_true_random=False))
+@settings(max_examples=500, deadline=None)
+def test_mutated_definitions(choice: random.Random) -> None:
+    text = "\n".join(choice.sample(SAMPLES, 3))
+    for _ in range(choice.randrange(1, 4)):
+        start = choice.randrange(len(text) + 1)
+        text = text[:start] + choice.choice(("", *FRAGMENTS)) + text[start + choice.randrange(3) :]
+    read_or_refuse(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "int32 " + "A" * 100_000 + "b=1",
+        "int32 x_" + "_1" * 50_000,
+        "int32[" * 50_000 + " x",
+        "int32 x " + "9" * 100_000,
+        "int32 X=0x" + "f" * 100_000,
+        "float64 x 1e" + "9" * 100_000,
+        "string x " + "\\" * 100_001,
+        "string x " + "\"'" * 50_000,
+        "string[] x [" + "'\\'" * 20_000 + "]",
+        "int8[] x [" + "[" * 50_000 + "]" * 50_000 + "]",
+        "int8 x #" + "[" * 50_000,
+        "int8 x #" + " " * 5_000 + "[",
+        "\n" * 100_000 + "x",
+    ],
+    ids=lambda text: repr(text[:12]),
+)
+def test_long_lines_take_no_long_time(text: str) -> None:
+    read_or_refuse(text)
