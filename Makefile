@@ -7,15 +7,18 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: demo test check test-kilted test-jazzy test-oldest benchmark golden format clean
 
+# What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
+KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
+JAZZY_TEST_PACKAGES := ros-jazzy-test-msgs ros-jazzy-test-interface-files protobuf==4.21.12 grpcio-tools==1.62.3
+
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable '.[ros,test]'
+	$(BIN)/pip install --quiet --editable '.[ros,test]' $(KILTED_TEST_PACKAGES)
 	touch $@
 
-# ROS 2 Jazzy, and with it the oldest protobuf runtime that generated code runs on.
 $(JAZZY)/ready: pyproject.toml
 	$(PYTHON) -m venv $(JAZZY)
-	$(JAZZY)/bin/pip install --quiet --editable '.[ros-jazzy,test]'
+	$(JAZZY)/bin/pip install --quiet --editable '.[ros-jazzy,test]' $(JAZZY_TEST_PACKAGES)
 	touch $@
 
 demo: $(VENV)/ready

@@ -1,0 +1,266 @@
+// The Python module: buffers in, bytes out, errors as exceptions, and the interpreter lock. Everything else
+// is in the core, which knows nothing of Python.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "../transcode.hpp"
+
+namespace nb = nanobind;
+
+namespace rosidl_proto {
+namespace {
+
+// From this size on, the time that it takes to give the interpreter lock away and back does not count.
+constexpr uint64_t kLarge = 64 * 1024;
+
+// Messages that one thread takes at a time in a batch.
+constexpr size_t kBlock = 64;
+
+// The bytes of any contiguous Python buffer, kept alive and, if it can change its size, locked.
+class Buffer {
+ public:
+  explicit Buffer(PyObject* object) {
+    if (PyBytes_Check(object)) {
+      Py_INCREF(object);
+      bytes_ = object;
+      input_ = {reinterpret_cast<const uint8_t*>(PyBytes_AS_STRING(object)),
+                static_cast<uint64_t>(PyBytes_GET_SIZE(object))};
+    } else {
+      if (PyObject_GetBuffer(object, &view_, PyBUF_SIMPLE) != 0) throw nb::python_error();
+      input_ = {static_cast<const uint8_t*>(view_.buf), static_cast<uint64_t>(view_.len)};
+    }
+  }
+  Buffer(const Buffer&) = delete;
+  Buffer(Buffer&& other) noexcept : bytes_(other.bytes_), view_(other.view_), input_(other.input_) {
+    other.bytes_ = nullptr;
+    other.view_.obj = nullptr;
+  }
+  Buffer& operator=(const Buffer&) = delete;
+  ~Buffer() {
+    Py_XDECREF(bytes_);
+    if (view_.obj != nullptr) PyBuffer_Release(&view_);
+  }
+
+  Input input() const { return input_; }
+
+ private:
+  PyObject* bytes_ = nullptr;
+  Py_buffer view_{};
+  Input input_{};
+};
+
+// The two directions behind one interface. What a direction keeps between measuring and writing can be shared
+// by many messages; a mark says where in it those of one message begin.
+struct CdrToProto {
+  struct Scratch {
+    explicit Scratch(const Plan&) {}
+    uint64_t mark() const { return lengths.size(); }
+    Lengths lengths;
+  };
+
+  static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
+                      Error& error) {
+    return measure_cdr_to_proto(plan, input, limit, scratch.lengths, size, error);
+  }
+  static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t mark, Output output,
+                    Error& error) {
+    return write_cdr_to_proto(plan, input, scratch.lengths, mark, output, error);
+  }
+};
+
+struct ProtoToCdr {
+  struct Scratch {
+    explicit Scratch(const Plan& plan) : fields(plan) {}
+    static uint64_t mark() { return 0; }
+    Fields fields;
+  };
+
+  static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
+                      Error& error) {
+    return measure_proto_to_cdr(plan, input, limit, scratch.fields, size, error);
+  }
+  static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t, Output output, Error& error) {
+    return write_proto_to_cdr(plan, input, scratch.fields, output, error);
+  }
+};
+
+nb::object new_bytes(uint64_t size) {
+  PyObject* const bytes = PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size));
+  if (bytes == nullptr) throw nb::python_error();
+  return nb::steal(bytes);
+}
+
+Output output_of(nb::handle bytes, uint64_t size) {
+  return {reinterpret_cast<uint8_t*>(PyBytes_AS_STRING(bytes.ptr())), size};
+}
+
+// Calls `work(i)` for each i below `count`, in order of i, on up to `threads` threads. `work` does not throw.
+template <class Work>
+void run_on_threads(size_t threads, size_t count, Work work) {
+  std::atomic<size_t> next{0};
+  const auto loop = [&] {
+    for (size_t i = next++; i < count; i = next++) work(i);
+  };
+  std::vector<std::thread> others;
+  try {
+    for (size_t i = 1; i < std::min(threads, count); ++i) others.emplace_back(loop);
+  } catch (const std::exception&) {
+    // The system has no more threads: those that there are do all of it.
+  }
+  loop();
+  for (std::thread& each : others) each.join();
+}
+
+class Transcoder {
+ public:
+  Transcoder(nb::bytes plan, std::string type_name, uint64_t size_limit)
+      : type_name_(std::move(type_name)), size_limit_(size_limit) {
+    const char* wrong = plan_.load(static_cast<const uint8_t*>(plan.data()), plan.size());
+    if (wrong != nullptr) throw nb::value_error(wrong);
+  }
+
+  const std::string& type_name() const { return type_name_; }
+
+  template <class Direction>
+  nb::object transcode(nb::handle data) const {
+    const Buffer buffer(data.ptr());
+    const Input input = buffer.input();
+    Error error;
+    typename Direction::Scratch scratch(plan_);
+    uint64_t size = 0;
+    if (input.size < kLarge) {
+      if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) fail(error, nb::none());
+      nb::object result = new_bytes(size);
+      if (!Direction::write(plan_, input, scratch, 0, output_of(result, size), error))
+        fail(error, nb::none());
+      return result;
+    }
+    bool good;
+    {
+      nb::gil_scoped_release release;
+      good = Direction::measure(plan_, input, size_limit_, scratch, &size, error);
+    }
+    if (!good) fail(error, nb::none());
+    nb::object result = new_bytes(size);
+    const Output output = output_of(result, size);
+    {
+      nb::gil_scoped_release release;
+      good = Direction::write(plan_, input, scratch, 0, output, error);
+    }
+    if (!good) fail(error, nb::none());
+    return result;
+  }
+
+  template <class Direction>
+  nb::list transcode_batch(nb::handle messages, size_t threads) const {
+    if (threads == 0) throw nb::value_error("threads must be 1 or more");
+    const nb::object fast =
+        nb::steal(PySequence_Fast(messages.ptr(), "a batch must be a sequence of messages"));
+    if (!fast.is_valid()) throw nb::python_error();
+
+    struct Job {
+      Buffer buffer;
+      uint64_t size = 0, mark = 0;
+      Output output{};
+    };
+    std::vector<Job> jobs;
+    // Taking a buffer can run Python code, which can change the list: so its length is asked for each time.
+    jobs.reserve(static_cast<size_t>(PySequence_Fast_GET_SIZE(fast.ptr())));
+    for (Py_ssize_t i = 0; i < PySequence_Fast_GET_SIZE(fast.ptr()); ++i) {
+      const nb::object item = nb::borrow(PySequence_Fast_GET_ITEM(fast.ptr(), i));
+      jobs.push_back(Job{Buffer(item.ptr())});
+    }
+    const size_t blocks = (jobs.size() + kBlock - 1) / kBlock;
+    std::deque<typename Direction::Scratch> scratches;
+    for (size_t i = 0; i < blocks; ++i) scratches.emplace_back(plan_);
+    Failure failure;
+
+    // Calls `step(job, scratch, error)` for each job, and keeps the error of the first job that fails.
+    const auto run = [&](auto step) {
+      nb::gil_scoped_release release;
+      run_on_threads(threads, blocks, [&](size_t block) {
+        for (size_t i = block * kBlock; i < std::min(jobs.size(), (block + 1) * kBlock); ++i) {
+          Error error;
+          if (i < failure.index && !step(jobs[i], scratches[block], error)) failure.keep(i, error);
+        }
+      });
+    };
+    run([&](Job& job, auto& scratch, Error& error) {
+      job.mark = scratch.mark();
+      return Direction::measure(plan_, job.buffer.input(), size_limit_, scratch, &job.size, error);
+    });
+    failure.check(*this);
+    nb::list results;
+    for (Job& job : jobs) {
+      const nb::object result = new_bytes(job.size);
+      job.output = output_of(result, job.size);
+      results.append(result);
+    }
+    run([&](Job& job, auto& scratch, Error& error) {
+      return Direction::write(plan_, job.buffer.input(), scratch, job.mark, job.output, error);
+    });
+    failure.check(*this);
+    return results;
+  }
+
+ private:
+  struct Failure {
+    std::atomic<size_t> index{SIZE_MAX};
+    Error error;
+    std::mutex mutex;
+
+    void keep(size_t i, const Error& reason) {
+      const std::lock_guard<std::mutex> guard(mutex);
+      if (i >= index) return;
+      index = i;
+      error = reason;
+    }
+
+    void check(const Transcoder& transcoder) const {
+      if (index != SIZE_MAX) transcoder.fail(error, nb::int_(index.load()));
+    }
+  };
+
+  [[noreturn]] void fail(const Error& error, nb::object batch_index) const {
+    const std::string path = field_path(error, plan_), text = reason(error);
+    const nb::object type =
+        nb::module_::import_("rosidl_adapter_proto.transcode.error").attr("TranscodeError");
+    const nb::object exception = type(type_name_, path, error.offset, text, batch_index);
+    PyErr_SetObject(type.ptr(), exception.ptr());
+    throw nb::python_error();
+  }
+
+  Plan plan_;
+  std::string type_name_;
+  uint64_t size_limit_;
+};
+
+}  // namespace
+}  // namespace rosidl_proto
+
+NB_MODULE(_core, module) {
+  using namespace rosidl_proto;
+  module.doc() = "The native transcoder: CDR to protobuf and back.";
+  // Transcoders live as long as the classes that hold them, which is as long as the interpreter.
+  nb::set_leak_warnings(false);
+  nb::class_<Transcoder>(module, "Transcoder")
+      .def(nb::init<nb::bytes, std::string, uint64_t>(), nb::arg("plan"), nb::arg("type_name"),
+           nb::arg("size_limit"))
+      .def_prop_ro("type_name", &Transcoder::type_name, "The ROS type, such as `sensor_msgs/msg/Imu`.")
+      .def("cdr_to_proto", &Transcoder::transcode<CdrToProto>, nb::arg("data"),
+           "Turn a serialized ROS message into a serialized protobuf message.")
+      .def("proto_to_cdr", &Transcoder::transcode<ProtoToCdr>, nb::arg("data"),
+           "Turn a serialized protobuf message into a serialized ROS message.")
+      .def("cdr_to_proto_batch", &Transcoder::transcode_batch<CdrToProto>, nb::arg("messages"),
+           nb::arg("threads") = 1, "Do `cdr_to_proto` for each message, on a number of threads.")
+      .def("proto_to_cdr_batch", &Transcoder::transcode_batch<ProtoToCdr>, nb::arg("messages"),
+           nb::arg("threads") = 1, "Do `proto_to_cdr` for each message, on a number of threads.");
+}

@@ -1,0 +1,36 @@
+// UTF-8 and UTF-16 (The Unicode Standard, section 3.9).
+#pragma once
+
+#include <cstdint>
+
+namespace rosidl_proto {
+
+// Whether the bytes are well-formed UTF-8.
+bool is_utf8(const uint8_t* data, uint64_t size);
+
+// Code points of well-formed UTF-8; of anything else a number that is not larger than `size`.
+uint64_t utf8_code_points(const uint8_t* data, uint64_t size);
+
+// UTF-16 code units that well-formed UTF-8 becomes; of anything else a number that is not larger than 2 *
+// `size`.
+uint64_t utf16_units(const uint8_t* data, uint64_t size);
+
+// Takes the next code point off well-formed UTF-8; `data` < `end`. Returns nullptr at what is not
+// well-formed.
+const uint8_t* next_code_point(const uint8_t* data, const uint8_t* end, uint32_t* code_point);
+
+inline bool is_surrogate(uint32_t unit) { return (unit & 0xfffff800) == 0xd800; }
+inline bool is_high_surrogate(uint32_t unit) { return (unit & 0xfffffc00) == 0xd800; }
+inline bool is_low_surrogate(uint32_t unit) { return (unit & 0xfffffc00) == 0xdc00; }
+inline uint32_t join_surrogates(uint32_t high, uint32_t low) {
+  return 0x10000 + ((high & 0x3ff) << 10) + (low & 0x3ff);
+}
+
+inline unsigned utf8_size(uint32_t code_point) {
+  return code_point < 0x80 ? 1 : code_point < 0x800 ? 2 : code_point < 0x10000 ? 3 : 4;
+}
+
+// Writes `utf8_size(code_point)` bytes.
+uint8_t* put_utf8(uint8_t* out, uint32_t code_point);
+
+}  // namespace rosidl_proto

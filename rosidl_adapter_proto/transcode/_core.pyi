@@ -1,0 +1,23 @@
+"""The native transcoder: CDR to protobuf and back."""
+
+from collections.abc import Sequence
+
+from typing_extensions import Buffer
+
+class Transcoder:
+    def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...
+    @property
+    def type_name(self) -> str:
+        """The ROS type, such as `sensor_msgs/msg/Imu`."""
+
+    def cdr_to_proto(self, data: Buffer) -> bytes:
+        """Turn a serialized ROS message into a serialized protobuf message."""
+
+    def proto_to_cdr(self, data: Buffer) -> bytes:
+        """Turn a serialized protobuf message into a serialized ROS message."""
+
+    def cdr_to_proto_batch(self, messages: Sequence[Buffer], threads: int = 1) -> list[bytes]:
+        """Do `cdr_to_proto` for each message, on a number of threads."""
+
+    def proto_to_cdr_batch(self, messages: Sequence[Buffer], threads: int = 1) -> list[bytes]:
+        """Do `proto_to_cdr` for each message, on a number of threads."""

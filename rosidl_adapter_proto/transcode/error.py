@@ -1,0 +1,39 @@
+"""The exception of the transcoder."""
+
+from __future__ import annotations
+
+from rosidl_adapter_proto.errors import Error
+
+
+class TranscodeError(Error):
+    """Serialized bytes cannot be turned into the other format.
+
+    Attributes:
+        type_name: The type that was being transcoded, such as `sensor_msgs/msg/Imu`.
+        field_path: Where in it, such as `header.frame_id` or `points[3].x`; empty for the message itself.
+        byte_offset: Where in the input, counted from its first byte. For a field that is not in the input, the place
+            of the message that should contain it.
+        reason: What is wrong there, and what to do.
+        batch_index: Which message of a batch it was; None outside of batches.
+    """
+
+    def __init__(
+        self,
+        type_name: str,
+        field_path: str,
+        byte_offset: int,
+        reason: str,
+        batch_index: int | None = None,
+    ) -> None:
+        self.type_name = type_name
+        self.field_path = field_path
+        self.byte_offset = byte_offset
+        self.reason = reason
+        self.batch_index = batch_index
+        where = f"{type_name}.{field_path}" if field_path else type_name
+        message = "" if batch_index is None else f" of message {batch_index}"
+        super().__init__(f"{where} at byte {byte_offset}{message}: {reason}")
+
+    def __reduce__(self) -> tuple[type[TranscodeError], tuple[str, str, int, str, int | None]]:
+        arguments = (self.type_name, self.field_path, self.byte_offset, self.reason, self.batch_index)
+        return type(self), arguments

@@ -1,0 +1,62 @@
+"""A second, slow and simple writer of plain CDR (OMG CORBA 3.3 part 2, section 9.3), to compare with."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+from ros_types import NUMBER_FORMATS, Types, Value, element_name, shape
+
+
+class CdrWriter:
+    """Writes values; `padding` lists the offsets of bytes that mean nothing."""
+
+    def __init__(self, types: Types, *, big_endian: bool = False, padding_byte: int = 0) -> None:
+        self.types = types
+        self.order = ">" if big_endian else "<"
+        self.padding_byte = padding_byte
+        self.header = bytes((0, 0 if big_endian else 1, 0, 0))
+        self.body = bytearray()
+        self.padding: list[int] = []
+
+    def number(self, form: str, value: Any) -> None:
+        while len(self.body) % struct.calcsize(form):
+            self.padding.append(len(self.body) + 4)
+            self.body.append(self.padding_byte)
+        self.body += struct.pack(self.order + form, value)
+
+    def message(self, name: str, value: Value) -> CdrWriter:
+        for field in self.types[name]["fields"]:
+            content, kind = value[field["name"]], shape(field)
+            if kind == "single":
+                self.element(field, content)
+                continue
+            if kind != "array":
+                self.number("I", len(content))
+            for each in content:
+                self.element(field, each)
+        return self
+
+    def element(self, field: dict[str, Any], value: Any) -> None:
+        name = element_name(field)
+        if name == "nested":
+            self.message(field["type"]["nested_type_name"], value)
+        elif name == "string":
+            encoded = value.encode() + b"\0"
+            self.number("I", len(encoded))
+            self.body += encoded
+        elif name == "wstring":
+            units = struct.unpack(f"<{len(value.encode('utf-16-le')) // 2}H", value.encode("utf-16-le"))
+            self.number("I", len(units))
+            for unit in units:
+                self.number("I", unit)
+        else:
+            self.number(NUMBER_FORMATS[name], value)
+
+    def bytes(self) -> bytes:
+        return self.header + bytes(self.body)
+
+
+def write_cdr(types: Types, name: str, value: Value, **options: Any) -> bytes:
+    """Serialize a value."""
+    return CdrWriter(types, **options).message(name, value).bytes()
