@@ -10,7 +10,7 @@ import importlib
 import sys
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
-from functools import cache
+from functools import cache, lru_cache
 from math import isfinite
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, NoReturn, TypeVar
 
@@ -463,14 +463,12 @@ def _raise_first_that_does_not_fit(values: Iterable[int], typecode: str) -> NoRe
 def packed(field_number: int, values: Any) -> bytes:
     """Return a packed repeated field of fixed-width numbers as it is on the wire (protobuf encoding, "Packed")."""
     data: bytes = values.tobytes()
-    if not data:
-        return b""
-    return b"%b%b%b" % (_length_delimited_tag(field_number), _varint(len(data)), data)
+    return _packed_prefix(field_number, len(data)) + data if data else b""
 
 
-@cache
-def _length_delimited_tag(field_number: int) -> bytes:
-    return _varint(field_number << 3 | 2)
+@lru_cache(maxsize=4096)  # most arrays have the same length again and again
+def _packed_prefix(field_number: int, length: int) -> bytes:
+    return _varint(field_number << 3 | 2) + _varint(length)
 
 
 def _varint(value: int) -> bytes:
@@ -480,6 +478,25 @@ def _varint(value: int) -> bytes:
         value >>= 7
     encoded.append(value)
     return bytes(encoded)
+
+
+def packed_fields(message: Message, *field_numbers: int) -> tuple[bytes, ...]:
+    """Return the little-endian bytes of packed fixed-width number fields of a message.
+
+    Serializing the whole message and finding them in it takes less time than asking protobuf for a single one.
+    """
+    fields: tuple[bytes, ...] = _native().packed_fields(message.SerializeToString(), *field_numbers)
+    return fields
+
+
+@cache
+def _native() -> Any:
+    return importlib.import_module("rosidl_adapter_proto.transcode._core")
+
+
+def array_of(data: bytes, typecode: str) -> Any:
+    """Return little-endian bytes as a numpy array of the C type of `typecode`."""
+    return _numpy().frombuffer(data, _NUMPY_TYPES[typecode])
 
 
 def elements(field: Any, typecode: str) -> Any:

@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "../packed_fields.hpp"
 #include "../transcode.hpp"
 
 namespace nb = nanobind;
@@ -243,6 +244,24 @@ class Transcoder {
   uint64_t size_limit_;
 };
 
+nb::tuple packed_fields(nb::bytes message, nb::args numbers) {
+  std::vector<uint64_t> wanted(numbers.size());
+  std::vector<Slice> slices(numbers.size());
+  for (size_t i = 0; i < wanted.size(); ++i) wanted[i] = nb::cast<uint64_t>(numbers[i]);
+  const auto* begin = static_cast<const uint8_t*>(message.data());
+  if (!find_packed_fields(begin, begin + message.size(), wanted.data(), wanted.size(), slices.data()))
+    throw nb::value_error("not a message as protobuf serializes it");
+  nb::object result = nb::steal(PyTuple_New(static_cast<Py_ssize_t>(slices.size())));
+  if (!result.is_valid()) throw nb::python_error();
+  for (size_t i = 0; i < slices.size(); ++i) {
+    PyObject* bytes = PyBytes_FromStringAndSize(reinterpret_cast<const char*>(slices[i].data),
+                                                static_cast<Py_ssize_t>(slices[i].size));
+    if (bytes == nullptr) throw nb::python_error();
+    PyTuple_SET_ITEM(result.ptr(), static_cast<Py_ssize_t>(i), bytes);
+  }
+  return nb::borrow<nb::tuple>(result);
+}
+
 }  // namespace
 }  // namespace rosidl_proto
 
@@ -251,6 +270,8 @@ NB_MODULE(_core, module) {
   module.doc() = "The native transcoder: CDR to protobuf and back.";
   // Transcoders live as long as the classes that hold them, which is as long as the interpreter.
   nb::set_leak_warnings(false);
+  module.def("packed_fields", &packed_fields, nb::arg("message"), nb::arg("numbers"),
+             "Return the bytes of packed repeated fields of a serialized message, by their numbers.");
   nb::class_<Transcoder>(module, "Transcoder")
       .def(nb::init<nb::bytes, std::string, uint64_t>(), nb::arg("plan"), nb::arg("type_name"),
            nb::arg("size_limit"))

@@ -92,6 +92,7 @@ class MessageAdapter:
     ros_class: str
     comment: tuple[str, ...]
     constants: tuple[AdapterConstant, ...]
+    packed_numbers: tuple[int, ...]
     fields: tuple[AdapterField, ...]
     defaults: str
     has_defaults: bool
@@ -270,6 +271,7 @@ def _message_adapter(
     proto: ProtoMessage, interface: Interface, names: Names, local: Mapping[TypeName, str]
 ) -> MessageAdapter:
     message = proto.source
+    packed_numbers = _packed_numbers(proto)
     return MessageAdapter(
         class_name=names.adapter(message.name),
         custom=proto.name,
@@ -282,7 +284,8 @@ def _message_adapter(
             AdapterConstant(each.name, _python_literal(each.value), _plain_lines(each.comment))
             for each in message.constants
         ),
-        fields=tuple(_adapter_field(each, local) for each in proto.fields),
+        packed_numbers=packed_numbers,
+        fields=tuple(_adapter_field(each, local, packed_numbers) for each in proto.fields),
         defaults=_defaults(message),
         has_defaults=_has_defaults(message, names),
     )
@@ -368,6 +371,8 @@ def _helpers(adapters: Iterable[MessageAdapter]) -> tuple[str, ...]:
     called = {name for line in lines for name in re.findall(r"(?<![\w.])(\w+)\(", line)}
     passed = {name for line in lines for name in re.findall(r"\beach\((\w+),", line)}
     used_by_all = {"check_custom", "conversion_error", "finish_custom", "finish_ros_message"}
+    if any(adapter.packed_numbers for adapter in adapters):
+        called.add("packed_fields")
     return tuple(sorted((called | passed | used_by_all) - {"list", "getattr", "setattr"}))
 
 
@@ -389,7 +394,24 @@ def _local_adapter_names(file: ProtoFile, names: Names) -> dict[TypeName, str]:
     return dict(sorted(local.items()))
 
 
-def _adapter_field(proto: ProtoField, local: Mapping[TypeName, str]) -> AdapterField:
+def _packed_numbers(proto: ProtoMessage) -> tuple[int, ...]:
+    """Return the numbers of the fields that are read with `packed_fields`, all in one go.
+
+    Not in a message that holds many others: these would be serialized here, and once more each for itself.
+    """
+    if any(each.repeated and isinstance(value_type(each.source.type), TypeName) for each in proto.fields):
+        return ()
+    return tuple(each.number for each in proto.fields if _is_packed(each))
+
+
+def _is_packed(field: ProtoField) -> bool:
+    element = value_type(field.source.type)
+    return field.repeated and isinstance(element, BasicType) and element.name in _FIXED_WIDTH
+
+
+def _adapter_field(
+    proto: ProtoField, local: Mapping[TypeName, str], packed_numbers: tuple[int, ...]
+) -> AdapterField:
     field = proto.source
     description = field_type_description(field.type)
     element = value_type(field.type)
@@ -402,14 +424,16 @@ def _adapter_field(proto: ProtoField, local: Mapping[TypeName, str]) -> AdapterF
         info += [str(description["capacity"])]
     if field.name == EMPTY_STRUCT_FIELD:
         return AdapterField(field.name, ", ".join(info), (), ())
-    to_custom, to_ros = _conversion(proto, local)
+    to_custom, to_ros = _conversion(proto, local, packed_numbers)
     return AdapterField(field.name, ", ".join(info), to_custom, to_ros)
 
 
 Lines = tuple[str, ...]
 
 
-def _conversion(proto: ProtoField, local: Mapping[TypeName, str]) -> tuple[Lines, Lines]:
+def _conversion(
+    proto: ProtoField, local: Mapping[TypeName, str], packed_numbers: tuple[int, ...]
+) -> tuple[Lines, Lines]:
     """Return the lines that convert a field, to protobuf and to ROS."""
     field = proto.source
     source, target = _read("source", field.name), _read("message", field.name)
@@ -437,11 +461,13 @@ def _conversion(proto: ProtoField, local: Mapping[TypeName, str]) -> tuple[Lines
             value = f"ros_messages({adapter}, {received})"
         return (to_custom_line,), (_assign(field.name, value),)
     if isinstance(element, BasicType) and element.name in TYPECODES:
-        return _numeric_array(proto, element, checked, received)
+        return _numeric_array(proto, element, checked, packed_numbers)
     return _list(proto, element, checked, received)
 
 
-def _numeric_array(proto: ProtoField, element: BasicType, checked: str, received: str) -> tuple[Lines, Lines]:
+def _numeric_array(
+    proto: ProtoField, element: BasicType, checked: str, packed_numbers: tuple[int, ...]
+) -> tuple[Lines, Lines]:
     field = proto.source
     source, target = _read("source", field.name), _read("message", field.name)
     code = TYPECODES[element.name]
@@ -452,13 +478,21 @@ def _numeric_array(proto: ProtoField, element: BasicType, checked: str, received
         to_custom = f"message.MergeFromString(packed({proto.number}, {values}))"
     else:
         to_custom = f"{target}.extend({values}.tolist())"
+    if proto.number in packed_numbers:
+        data = f"arrays[{packed_numbers.index(proto.number)}]"
+        array = f'array_of({data}, "{code}")'
+    elif proto.type == "bytes":
+        data, array = source, f'numbers({source}, "{code}")'
+    else:
+        array = f'elements({source}, "{code}")'
+        data = f"{array}.tobytes()"
     if isinstance(field.type, ArrayType):
-        reader = "numbers" if proto.type == "bytes" else "elements"
-        return (to_custom,), (f'fill_array({target}, {reader}({source}, "{code}"))',)
-    data = received if proto.type == "bytes" else f'elements({received}, "{code}").tobytes()'
+        return (to_custom,), (f"fill_array({target}, {array})",)
+    bound = field.type.bound if isinstance(field.type, SequenceType) else None
+    check = (f"at_most({source}, {bound})",) if bound else ()
     # A new ROS message has an empty array here, unless the definition has a default value.
     clear = (f"del {target}[:]",) if field.default else ()
-    return (to_custom,), (*clear, f"{target}.frombytes({data})")
+    return (to_custom,), (*check, *clear, f"{target}.frombytes({data})")
 
 
 def _list(

@@ -4,6 +4,17 @@ from collections.abc import Sequence
 
 from typing_extensions import Buffer
 
+def packed_fields(message: bytes, *numbers: int) -> tuple[bytes, ...]:
+    """Return the bytes of packed repeated fields of a serialized message, by their numbers.
+
+    Args:
+        message: A message as protobuf runtimes serialize it: each field once, in packed form, and no groups.
+        numbers: The numbers of the fields; one that is absent has no bytes.
+
+    Raises:
+        ValueError: The message is not of this form.
+    """
+
 class Transcoder:
     def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...
     @property

@@ -118,9 +118,8 @@ class SampleAdapter(adapter.TypeAdapter[Sample, typing.Any]):
             field = "data"
             message.data.frombytes(source.data)
             field = "offsets"
-            message.offsets.frombytes(
-                elements(at_most(source.offsets, 8), "h").tobytes()
-            )
+            at_most(source.offsets, 8)
+            message.offsets.frombytes(elements(source.offsets, "h").tobytes())
             field = "position"
             fill_array(message.position, elements(source.position, "d"))
             field = "switches"
