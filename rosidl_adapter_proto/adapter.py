@@ -21,6 +21,10 @@ from rosidl_adapter_proto.errors import ConversionError, Error
 
 if TYPE_CHECKING:
     from google.protobuf.descriptor import FileDescriptor
+    from typing_extensions import Buffer
+
+    from rosidl_adapter_proto.interfaces.description import IndividualTypeDescription, TypeDescription
+    from rosidl_adapter_proto.transcode import Transcoder
 
 CustomT = TypeVar("CustomT", bound=Message)
 RosT = TypeVar("RosT")
@@ -69,6 +73,16 @@ class _RosClass:
         return ros_class
 
 
+class _Transcoder:
+    """Makes the native transcoder of an adapter when it is first asked for, and then makes way for it."""
+
+    def __get__(self, instance: object, owner: type[TypeAdapter[Any, Any]]) -> Transcoder:
+        from rosidl_adapter_proto.transcode import Transcoder
+
+        owner.transcoder = Transcoder(owner.type_description(), owner.custom_type.DESCRIPTOR)
+        return owner.transcoder
+
+
 class FieldInfo(NamedTuple):
     """The type of a field, as `type_description_interfaces/msg/FieldType` has it (REP-2011).
 
@@ -100,6 +114,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         fields: The fields of the ROS message, in order.
         defaults: Default values other than zero, in terms of protobuf.
         has_defaults: Whether the type or one inside it has any.
+        transcoder: Turns serialized messages from one format into the other, made when it is first asked for.
         ros_class: Where the ROS message class is: `module:Class`.
     """
 
@@ -110,6 +125,10 @@ class TypeAdapter(Generic[CustomT, RosT]):
     fields: ClassVar[tuple[FieldInfo, ...]]
     defaults: ClassVar[Mapping[str, Any]] = {}
     has_defaults: ClassVar[bool] = False
+    if TYPE_CHECKING:
+        transcoder: ClassVar[Transcoder]
+    else:
+        transcoder = _Transcoder()
     ros_class: ClassVar[str]
 
     @staticmethod
@@ -156,6 +175,27 @@ class TypeAdapter(Generic[CustomT, RosT]):
         raise NotImplementedError
 
     @classmethod
+    def to_cdr(cls, source: CustomT) -> bytes:
+        """Return a protobuf message as ROS sends it: little-endian CDR with its encapsulation header.
+
+        No ROS message is made on the way, and ROS need not be installed.
+
+        Raises:
+            ConversionError: A value does not fit; it is a `TranscodeError`, which has the place in the bytes as well.
+        """
+        check_custom(source, cls)
+        return cls.transcoder.proto_to_cdr(source.SerializeToString())
+
+    @classmethod
+    def from_cdr(cls, data: Buffer) -> CustomT:
+        """Return the protobuf message of a serialized ROS message: plain CDR of either byte order.
+
+        Raises:
+            ConversionError: The bytes are not a valid message of the type; it is a `TranscodeError`.
+        """
+        return cls.custom_type.FromString(cls.transcoder.cdr_to_proto(data))
+
+    @classmethod
     def new(cls, **fields: Any) -> CustomT:
         """Make a protobuf message with the default values of the ROS definition, which proto3 cannot carry.
 
@@ -174,7 +214,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         return message
 
     @classmethod
-    def type_description(cls) -> dict[str, Any]:
+    def type_description(cls) -> TypeDescription:
         """Return the type description (REP-2011), in the form of the `.json` files of ROS, without default values."""
         found: dict[str, type[TypeAdapter[Any, Any]]] = {}
         waiting: list[type[TypeAdapter[Any, Any]]] = [cls]
@@ -193,7 +233,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
 _NESTED, _NESTED_ARRAY = 1, 49
 
 
-def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> dict[str, Any]:
+def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualTypeDescription:
     return {
         "type_name": adapter.type_name,
         "fields": [

@@ -5,6 +5,8 @@ A message says what is wrong, where (file, line and column, or the path of the f
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class Error(Exception):
     """The base of every error that this project raises on purpose."""
@@ -35,8 +37,15 @@ class ConversionError(Error):
         self.type_name = type_name
         self.field_path = field_path
         self.reason = reason
-        where = f"{type_name}.{field_path}" if field_path else type_name
-        super().__init__(f"{where}: {reason}")
+        super().__init__(type_name, field_path, reason)
 
-    def __reduce__(self) -> tuple[type[ConversionError], tuple[str, str, str]]:
+    @property
+    def where(self) -> str:
+        """The type and the field in it, such as `sensor_msgs/msg/Image.header.stamp.sec`."""
+        return f"{self.type_name}.{self.field_path}" if self.field_path else self.type_name
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.reason}"
+
+    def __reduce__(self) -> tuple[type[ConversionError], tuple[Any, ...]]:
         return type(self), (self.type_name, self.field_path, self.reason)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.errors import ConversionError
 
 
-class TranscodeError(Error):
+class TranscodeError(ConversionError):
     """Serialized bytes cannot be turned into the other format.
 
     Attributes:
@@ -25,14 +25,13 @@ class TranscodeError(Error):
         reason: str,
         batch_index: int | None = None,
     ) -> None:
-        self.type_name = type_name
-        self.field_path = field_path
+        super().__init__(type_name, field_path, reason)
         self.byte_offset = byte_offset
-        self.reason = reason
         self.batch_index = batch_index
-        where = f"{type_name}.{field_path}" if field_path else type_name
-        message = "" if batch_index is None else f" of message {batch_index}"
-        super().__init__(f"{where} at byte {byte_offset}{message}: {reason}")
+
+    def __str__(self) -> str:
+        message = "" if self.batch_index is None else f" of message {self.batch_index}"
+        return f"{self.where} at byte {self.byte_offset}{message}: {self.reason}"
 
     def __reduce__(self) -> tuple[type[TranscodeError], tuple[str, str, int, str, int | None]]:
         arguments = (self.type_name, self.field_path, self.byte_offset, self.reason, self.batch_index)
