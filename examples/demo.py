@@ -15,7 +15,9 @@ HERE = Path(__file__).parent
 
 def run(title: str, *command: str | Path) -> None:
     """Run a command after showing it."""
-    print(f"\n--- {title}\n$ {' '.join(Path(part).name if Path(part).is_absolute() else str(part) for part in command)}")
+    print(
+        f"\n--- {title}\n$ {' '.join(Path(part).name if Path(part).is_absolute() else str(part) for part in command)}"
+    )
     sys.stdout.flush()
     subprocess.run(command, check=True)
 

@@ -1,7 +1,7 @@
 """Converts between protobuf and ROS messages, in a ROS 2 environment.
 
-    rosidl-proto generate sensor_msgs
-    PYTHONPATH=generated/python python examples/with_ros.py
+rosidl-proto generate sensor_msgs
+PYTHONPATH=generated/python python examples/with_ros.py
 """
 
 from __future__ import annotations

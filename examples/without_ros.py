@@ -1,7 +1,7 @@
 """Protobuf types of ROS interfaces on a machine without ROS: build, serialize, JSON.
 
-    rosidl-proto generate sensor_msgs
-    PYTHONPATH=generated/python python examples/without_ros.py
+rosidl-proto generate sensor_msgs
+PYTHONPATH=generated/python python examples/without_ros.py
 """
 
 from __future__ import annotations

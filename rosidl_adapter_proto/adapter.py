@@ -183,7 +183,8 @@ class TypeAdapter(Generic[CustomT, RosT]):
         Raises:
             ConversionError: A value does not fit; it is a `TranscodeError`, which has the place in the bytes as well.
         """
-        check_custom(source, cls)
+        if type(source) is not cls.custom_type:
+            check_custom(source, cls)
         return cls.transcoder.proto_to_cdr(source.SerializeToString())
 
     @classmethod

@@ -43,11 +43,7 @@ class RosMessages:
         if name not in self._made:
             model = self.sources.message(name)
             values = st.fixed_dictionaries(
-                {
-                    each.name: self.value(each.type)
-                    for each in model.fields
-                    if each.name != EMPTY_STRUCT_FIELD
-                }
+                {each.name: self.value(each.type) for each in model.fields if each.name != EMPTY_STRUCT_FIELD}
             )
             ros_class = self.adapters[name].ros_message_type
             self._made[name] = values.map(lambda fields: ros_class(**fields))
@@ -82,7 +78,7 @@ class RosMessages:
         if value_type.name == "octet":
             return st.binary(min_size=1, max_size=1)
         if value_type.name in ("float", "double", "long double"):
-            # NaN is not equal to itself, and ROS refuses the last float32 before infinity: both have tests of their own.
+            # NaN is not equal to itself, and ROS refuses the last float32 before infinity.
             if value_type.name == "float":
                 return st.floats(-(2.0**127), 2.0**127, width=32) | st.sampled_from([inf, -inf])
             return st.floats(allow_nan=False)

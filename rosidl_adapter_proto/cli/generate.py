@@ -15,7 +15,7 @@ from rosidl_adapter_proto.generate import Options, Progress, Result, generate
 
 
 @click.command("generate")
-@click.argument("what", nargs=-1, required=True, metavar="WHAT...", shell_complete=complete_name)
+@click.argument("what", nargs=-1, metavar="WHAT...", shell_complete=complete_name)
 @click.option(
     "--output",
     "-o",
@@ -36,7 +36,9 @@ from rosidl_adapter_proto.generate import Options, Progress, Result, generate
 @click.option("--check", is_flag=True, help="Write nothing; exit with 1 and a list if anything is stale.")
 @click.option("--verbose", "-v", is_flag=True, help="List every file and where definitions come from.")
 @source_options
+@click.pass_context
 def generate_command(
+    context: click.Context,
     what: tuple[str, ...],
     output: Path,
     deps: bool,
@@ -54,6 +56,11 @@ def generate_command(
     WHAT is a package (std_msgs), a type (std_msgs/msg/String), a package folder or a folder of packages (./src), or
     a definition (./my_msgs/msg/Track.msg).
     """
+    what = what or tuple((context.default_map or {}).get("what", ()))  # before 8.3, click does not look there
+    if not what:
+        raise click.UsageError(
+            "Missing argument 'WHAT...': name a package, or set `packages` in the configuration."
+        )
     request, sources = find_request(what, include, distro, deps)
     options = Options(numbering, lock_file, events, python_root)
     with _progress() as progress:
@@ -69,7 +76,8 @@ def generate_command(
         _list_files(result, output, lock_file, "wrote", "removed")
     changes = result.changes
     counts = f"{len(changes.written)} written, {len(changes.removed)} removed, {changes.unchanged} unchanged"
-    click.echo(f"{output}: {len(result.interfaces)} interfaces, files: {counts}")
+    number = len(result.interfaces)
+    click.echo(f"{output}: {number} interface{'s' if number != 1 else ''}, files: {counts}")
     return 0
 
 

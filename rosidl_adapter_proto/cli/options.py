@@ -108,7 +108,7 @@ def find_request(
         path = Path(text)
         if path.suffix in SUFFIXES:
             source, name = file_source(_existing(path))
-            given.append(source)
+            _add_file(given, source, name)
             types.append(name)
         elif is_path(text):
             source = folder_source(_existing(path))
@@ -116,7 +116,7 @@ def find_request(
             packages += source.packages
         else:
             names.append(text)
-    sources = find_sources(include, distro, _merged(given))
+    sources = find_sources(include, distro, given)
     for text in names:
         if text not in sources.packages and Path(text).is_dir():
             source = folder_source(Path(text))
@@ -135,17 +135,14 @@ def is_path(text: str) -> bool:
     return text.startswith((".", "/")) or text.endswith(("/", *SUFFIXES)) or "\\" in text
 
 
-def _merged(given: Iterable[Source]) -> list[Source]:
-    """Join the files of one package that were named one by one."""
-    merged: list[Source] = []
-    for source in given:
-        if merged and set(merged[-1].packages) == set(source.packages):
-            last = merged.pop()
-            packages = {name: {**source.packages[name], **last.packages[name]} for name in source.packages}
-            merged.append(Source(last.origin, packages))
-        else:
-            merged.append(source)
-    return merged
+def _add_file(given: list[Source], source: Source, name: TypeName) -> None:
+    """Add the definition of a file that was named to the source that has its package already, or else its source."""
+    for index, other in enumerate(given):
+        if name.package in other.packages:
+            package = {**other.packages[name.package], name: source.packages[name.package][name]}
+            given[index] = Source(other.origin, {**other.packages, name.package: package})
+            return
+    given.append(source)
 
 
 def _existing(path: Path) -> Path:

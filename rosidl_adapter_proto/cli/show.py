@@ -24,6 +24,8 @@ def show_command(
     distro: str | None,
 ) -> None:
     """Show the definition of TYPE (std_msgs/msg/String) and the .proto made of it, side by side."""
+    if "/" not in type_name:
+        raise click.UsageError(f"{type_name!r} is not the name of a type, such as std_msgs/msg/String")
     sources = find_sources(include, distro)
     definition = sources.definition(sources.full_name(type_name))
     proto = proto_text(definition.name, sources, Options(numbering, lock_file, events))

@@ -245,9 +245,13 @@ def _remove_folder(folder: Path) -> None:
 
 
 def _remove(output: Path, path: str) -> None:
-    """Remove a file, and the folders that are empty without it."""
-    (output / path).unlink(missing_ok=True)
-    for folder in (output / path).parents:
+    """Remove a file, what Python cached of it, and the folders that are empty without it."""
+    file = output / path
+    file.unlink(missing_ok=True)
+    for cached in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
+        cached.unlink(missing_ok=True)
+    _remove_empty(file.parent / "__pycache__")
+    for folder in file.parents:
         if folder == output or not _remove_empty(folder):
             break
 

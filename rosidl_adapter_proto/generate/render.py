@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -70,7 +71,8 @@ def render_modules(
     ):
         yield from map(_render_module, modules, serialized)
         return
-    with ProcessPoolExecutor(workers, multiprocessing.get_context("fork")) as pool:
+    ignore_interrupts = (signal.signal, (signal.SIGINT, signal.SIG_IGN))  # they are for the parent
+    with ProcessPoolExecutor(workers, multiprocessing.get_context("fork"), *ignore_interrupts) as pool:
         yield from pool.map(_render_module, modules, serialized, chunksize=4)
 
 

@@ -446,7 +446,7 @@ def _split_strings(text: str) -> list[str]:
                 text = text[end + 1 :]
         if not is_quoted:
             end = text.find(",") if "," in text else len(text)
-            parts.append(text[:end].strip())
+            parts.append(text[:end])
             text = text[end:]
         text = text.lstrip(" ").removeprefix(",")
     return [part.strip() for part in parts]
@@ -556,7 +556,7 @@ def _tidy(lines: list[str]) -> tuple[str, ...]:
     """Drop outer empty lines, fold inner ones, and take away common indentation."""
     kept: list[str] = []
     for line in textwrap.dedent("\n".join(lines)).strip("\n").split("\n"):
-        if line.strip() or (kept and kept[-1]):
+        if line or (kept and kept[-1]):
             kept.append(line.rstrip())
     while kept and not kept[-1]:
         kept.pop()

@@ -446,7 +446,7 @@ def _missing_error(sources: Sources, missing: Mapping[str, list[str]]) -> Defini
             near = _near_types(name, sources.packages[package])
         else:
             near = _near_misses(package, sources.packages)
-        lines.append(f"{name} was not found, but {users[0]}{more} needs it{near}")
+        lines.append(f"{name} was not found, but {users[0]}{more} need{'' if more else 's'} it{near}")
     return DefinitionError("\n".join([*lines, sources.places()]))
 
 
@@ -516,7 +516,7 @@ def _read_package(folder: Path, name: str, origin: str) -> Package:
     found: dict[TypeName, Definition] = {}
     for namespace in NAMESPACES:
         try:
-            files = sorted(os.listdir(folder / namespace))
+            files = os.listdir(folder / namespace)
         except (FileNotFoundError, NotADirectoryError):
             continue
         except OSError as error:

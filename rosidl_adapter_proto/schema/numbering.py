@@ -7,9 +7,11 @@ Sequential numbers make smaller messages; the lock file keeps each number for it
 from __future__ import annotations
 
 import json
+import re
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any, Protocol
 
 from rosidl_adapter_proto.errors import SchemaError
@@ -108,7 +110,7 @@ class SequentialNumbering:
         if text is None:
             return cls(file, {})
         try:
-            content = json.loads(text)
+            content = json.loads(text, object_pairs_hook=_unique)
             if content["version"] != _LOCK_VERSION:
                 raise SchemaError(
                     f"{file} has version {content['version']}, this program reads version {_LOCK_VERSION}; "
@@ -118,10 +120,12 @@ class SequentialNumbering:
                 name: LockedMessage(_read_fields(entry["fields"]), _read_fields(entry["removed"]))
                 for name, entry in content["messages"].items()
             }
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise SchemaError(
-                f"{file} is not a lock file of rosidl-proto ({error!r}); restore it from version control"
-            ) from None
+        except KeyError as error:
+            raise _damaged(file, f"{error} is missing") from None
+        except (TypeError, AttributeError, RecursionError):
+            raise _damaged(file, "it is not a lock file of rosidl-proto") from None
+        except ValueError as error:
+            raise _damaged(file, str(error)) from None
         for name, message in messages.items():
             _check_numbers(file, name, message)
         return cls(file, messages)
@@ -173,25 +177,44 @@ def _field_dict(fields: Mapping[str, LockedField]) -> dict[str, str]:
     return {name: f"{each.number} {each.type}" for name, each in by_number}
 
 
+def _damaged(file: str, reason: str) -> SchemaError:
+    return SchemaError(f"{file} is damaged: {reason}; restore it from version control")
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Make a JSON object, and refuse a name that stands in it twice, as after a merge that went wrong."""
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(each for each in names if names.count(each) > 1)!r} stands in it twice")
+    return content
+
+
 def _read_fields(content: Mapping[str, Any]) -> dict[str, LockedField]:
     fields = {}
     for name, text in content.items():
-        number, type_text = text.split(" ", 1)
-        fields[name] = LockedField(int(number), type_text)
+        match = _LOCKED_FIELD.fullmatch(text)
+        if match is None:
+            raise ValueError(f"{name!r} has {text!r} instead of a number and a type")
+        fields[name] = LockedField(int(match[1]), match[2])
     return fields
 
 
+_LOCKED_FIELD = re.compile(r"([0-9]{1,10}) ((?:repeated )?[A-Za-z0-9_.]+)")
+
+
 def _check_numbers(file: str, name: str, message: LockedMessage) -> None:
+    for field_name in message.fields.keys() & message.removed.keys():
+        raise _damaged(file, f"{name} has {field_name!r} both as a field and as a removed one")
     used: dict[int, str] = {}
     for field_name, each in (*message.fields.items(), *message.removed.items()):
         if not _is_usable(each.number):
-            raise SchemaError(
-                f"{file}: {name}.{field_name} has number {each.number}, which protobuf does not allow"
+            raise _damaged(
+                file, f"{name}.{field_name} has number {each.number}, which protobuf does not allow"
             )
         if each.number in used:
-            raise SchemaError(
-                f"{file}: {name} has number {each.number} for both {used[each.number]!r} and {field_name!r}; "
-                "restore the file from version control"
+            raise _damaged(
+                file, f"{name} has number {each.number} for both {used[each.number]!r} and {field_name!r}"
             )
         used[each.number] = field_name
 
@@ -200,9 +223,14 @@ def _is_usable(number: int) -> bool:
     return 1 <= number <= LARGEST_NUMBER and not FIRST_RESERVED <= number <= LAST_RESERVED
 
 
-def _next_number(used: Iterable[int]) -> int:
+def _next_number(used: set[int]) -> int:
+    """Return a number that was never used: behind the last one, or in a gap if that was the last of all."""
     number = max(used, default=0) + 1
-    return number if _is_usable(number) else LAST_RESERVED + 1
+    if FIRST_RESERVED <= number <= LAST_RESERVED:
+        return LAST_RESERVED + 1
+    return (
+        number if number <= LARGEST_NUMBER else next(n for n in count(1) if n not in used and _is_usable(n))
+    )
 
 
 def _type_text(field_type: FieldType) -> str:

@@ -83,7 +83,9 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespac
     sources = Sources((folder_source(root / "things"), store_source()))
     generate(Request(("things",)), sources, root / "out", Options(python_root="things_root"))
     sys.path.insert(0, str(root / "out/python"))
-    modules = {name: importlib.import_module(f"things_root.things.{name}") for name in ("msg", "srv", "action")}
+    modules = {
+        name: importlib.import_module(f"things_root.things.{name}") for name in ("msg", "srv", "action")
+    }
     yield SimpleNamespace(folder=root / "out", **modules)
     sys.path.remove(str(root / "out/python"))
 
@@ -222,11 +224,17 @@ def test_round_trip_with_any_class(package: SimpleNamespace, fake_ros: Any) -> N
         ({"blob": b"12345"}, "blob: 5 elements, more than the bound of 4"),
         ({"shorts": [1, -32769]}, "shorts[1]: -32769 is not in the range from -32768 to 32767"),
         ({"three_shorts": [1]}, "three_shorts: 1 elements, but the array has 3 (or none, for zeros)"),
-        ({"three_shorts": [1, 2, 1 << 16]}, "three_shorts[2]: 65536 is not in the range from -32768 to 32767"),
+        (
+            {"three_shorts": [1, 2, 1 << 16]},
+            "three_shorts[2]: 65536 is not in the range from -32768 to 32767",
+        ),
         ({"two_doubles": [1]}, "two_doubles: 1 elements, but the array has 2 (or none, for zeros)"),
         ({"few": [1, 2, 3]}, "few: 3 elements, more than the bound of 2"),
         ({"flags": [True]}, "flags: 1 elements, but the array has 2 (or none, for zeros)"),
-        ({"wides": [b"", b"x"]}, "wides[1]: 'utf-16-le' codec can't decode byte 0x78 in position 0: truncated data"),
+        (
+            {"wides": [b"", b"x"]},
+            "wides[1]: 'utf-16-le' codec can't decode byte 0x78 in position 0: truncated data",
+        ),
         ({"two_parts": [{}]}, "two_parts: 1 elements, but the array has 2 (or none, for zeros)"),
     ],
 )
@@ -302,7 +310,9 @@ def test_new_applies_default_values(package: SimpleNamespace) -> None:
 
 def test_constants(package: SimpleNamespace) -> None:
     adapter = package.msg.EverythingAdapter
-    assert (adapter.DEBUG, adapter.NAME, adapter.LIMIT) == (10, "x", math.inf)
+    assert adapter.DEBUG == 10
+    assert adapter.NAME == "x"
+    assert adapter.LIMIT == math.inf
     assert package.srv.Set_RequestAdapter.A == 3
 
 
@@ -379,11 +389,20 @@ def test_import_is_light(package: SimpleNamespace) -> None:
     assert not heavy & set(json.loads(output))
 
 
-def test_protoc_output_of_the_same_file_can_be_loaded_beside(package: SimpleNamespace, tmp_path: Path) -> None:
+def test_protoc_output_of_the_same_file_can_be_loaded_beside(
+    package: SimpleNamespace, tmp_path: Path
+) -> None:
     """protoc's own Python module of a generated .proto file shares the classes' descriptors."""
     proto = "things/msg/Header2.proto"
     subprocess.run(
-        [sys.executable, "-m", "grpc_tools.protoc", f"-I{package.folder / 'proto'}", f"--python_out={tmp_path}", proto],
+        [
+            sys.executable,
+            "-m",
+            "grpc_tools.protoc",
+            f"-I{package.folder / 'proto'}",
+            f"--python_out={tmp_path}",
+            proto,
+        ],
         check=True,
     )
     program = (

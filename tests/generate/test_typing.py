@@ -12,7 +12,7 @@ import pytest
 from tests.generate.conftest import Generated
 
 # Lines that end in a comment must give that error, or that type; all others none.
-USES = '''\
+USES = """\
 from rosidl_proto.sensor_msgs.msg import Imu, ImuAdapter
 from rosidl_proto.std_srvs.srv import SetBool_Request, SetBoolAdapter
 from rosidl_proto.test_msgs.action import FibonacciAdapter
@@ -31,7 +31,7 @@ Imu(nonsense=1)  # error
 SetBool_Request(data="yes")  # error
 message.HasField("angular_velocity_covariance")  # error
 message.ClearField("nonsense")  # error
-'''
+"""
 
 
 @pytest.fixture
@@ -65,7 +65,9 @@ def test_mypy_strict(ros_install: Generated, uses: Path) -> None:
     command += [str(ros_install.folder / "python/rosidl_proto")]
     report = subprocess.run(command, capture_output=True, check=False, text=True).stdout
     assert not re.search(r"rosidl_proto/.*error", report), report
-    check_report(report, r"uses\.py:(\d+): error", r'uses\.py:(\d+): note: Revealed type is "(?:[\w.]*\.)?(\w+)"')
+    check_report(
+        report, r"uses\.py:(\d+): error", r'uses\.py:(\d+): note: Revealed type is "(?:[\w.]*\.)?(\w+)"'
+    )
 
 
 def test_pyright(ros_install: Generated, uses: Path) -> None:
@@ -77,4 +79,6 @@ def test_pyright(ros_install: Generated, uses: Path) -> None:
     command = [sys.executable, "-m", "pyright", "--pythonpath", sys.executable, "-p", str(uses.parent)]
     report = subprocess.run(command, capture_output=True, check=False, text=True).stdout
     assert not re.search(r"rosidl_proto/.*error", report), report
-    check_report(report, r"uses\.py:(\d+):\d+ - error", r'uses\.py:(\d+):\d+ - information: Type of ".*" is "(\w+)"')
+    check_report(
+        report, r"uses\.py:(\d+):\d+ - error", r'uses\.py:(\d+):\d+ - information: Type of ".*" is "(\w+)"'
+    )

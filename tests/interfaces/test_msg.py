@@ -177,6 +177,7 @@ FIELDS: list[tuple[str, Field]] = [
     ("float64 x Infinity", Field("x", DOUBLE, math.inf)),
     ("float64 x NaN", Field("x", DOUBLE, math.nan)),
     # Strings
+    ("string  x   a", Field("x", STRING, "a")),
     ("string x a b  c", Field("x", STRING, "a b  c")),
     ('string x " a "', Field("x", STRING, " a ")),
     ("string x ' a '", Field("x", STRING, " a ")),
@@ -219,6 +220,7 @@ FIELDS: list[tuple[str, Field]] = [
     (r"string x \\u20ac", Field("x", STRING, r"\u20ac")),
     (r"wstring x \\u20ac", Field("x", WSTRING, r"\u20ac")),
     # Arrays
+    ("int32[]  x   []", Field("x", SequenceType(INT32), ())),
     ("int32[] x []", Field("x", SequenceType(INT32), ())),
     ("int32[] x [1]", Field("x", SequenceType(INT32), (1,))),
     ("int32[3] x [1, 0x2 ,-3]", Field("x", ArrayType(INT32, 3), (1, 2, -3))),

@@ -1,0 +1,296 @@
+"""What messages cost: protobuf through the transcoder, against rclpy and against adapters as a user would write them.
+
+    python benchmarks/messages.py
+
+needs an environment with rclpy and sensor_msgs. Every row is a ratio: its two sides are measured in one run, taking
+turns, and the fastest turn of each counts.
+"""
+
+from __future__ import annotations
+
+import array
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import timeit
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rosidl_adapter_proto.generate import Options, Request, generate
+from rosidl_adapter_proto.interfaces.sources import Sources, prefix_sources, store_source
+
+TURNS = 9
+SECONDS_PER_TURN = 0.05
+MESSAGES_PER_TURN = {"Imu": 1000, "LaserScan": 1000, "Image": 30}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One comparison: `ratio` is the time of the peer divided by that of the work, or the other way round."""
+
+    work: str
+    against: str
+    ratio: float
+    wanted: str
+
+
+def seconds(*calls: Callable[[], object]) -> list[float]:
+    """Return the time that each call takes."""
+    timers = [timeit.Timer(call) for call in calls]
+    numbers = [max(1, int(SECONDS_PER_TURN / (timer.timeit(3) / 3))) for timer in timers]
+    best = [float("inf")] * len(timers)
+    for _ in range(TURNS):
+        for index, (timer, number) in enumerate(zip(timers, numbers, strict=True)):
+            best[index] = min(best[index], timer.timeit(number) / number)
+    return best
+
+
+def ros_imu() -> Any:
+    """Return a message of a few hundred bytes."""
+    from sensor_msgs.msg import Imu
+
+    message = Imu()
+    message.header.frame_id = "imu_link"
+    message.header.stamp.sec, message.header.stamp.nanosec = 1_700_000_000, 5_000_000
+    for vector in (message.orientation, message.angular_velocity, message.linear_acceleration):
+        vector.x, vector.y, vector.z = 0.1, 0.2, 9.8
+    for name in ("orientation", "angular_velocity", "linear_acceleration"):
+        setattr(message, f"{name}_covariance", [0.5] * 9)
+    return message
+
+
+def ros_laser_scan() -> Any:
+    """Return a message with two arrays of 720 numbers."""
+    from sensor_msgs.msg import LaserScan
+
+    message = LaserScan(angle_min=-3.0, angle_max=3.0, angle_increment=0.5, range_max=30.0)
+    message.header.frame_id = "laser"
+    message.ranges = array.array("f", [1.5] * 720)
+    message.intensities = array.array("f", [2.5] * 720)
+    return message
+
+
+def ros_image() -> Any:
+    """Return a message of 6 MB."""
+    from sensor_msgs.msg import Image
+
+    message = Image(width=1920, height=1080, encoding="rgb8", step=1920 * 3)
+    message.data = array.array("B", bytes(1920 * 1080 * 3))
+    return message
+
+
+# Adapters as a user would write them: attribute by attribute.
+
+
+def copy_header(source: Any, target: Any) -> None:
+    target.header.stamp.sec = source.header.stamp.sec
+    target.header.stamp.nanosec = source.header.stamp.nanosec
+    target.header.frame_id = source.header.frame_id
+
+
+def copy_vector(source: Any, target: Any, names: str) -> None:
+    for name in names:
+        setattr(target, name, getattr(source, name))
+
+
+def copy_imu(source: Any, target: Any, assign: Callable[[Any, str, Any], None]) -> Any:
+    copy_header(source, target)
+    copy_vector(source.orientation, target.orientation, "xyzw")
+    copy_vector(source.angular_velocity, target.angular_velocity, "xyz")
+    copy_vector(source.linear_acceleration, target.linear_acceleration, "xyz")
+    for name in ("orientation", "angular_velocity", "linear_acceleration"):
+        assign(target, f"{name}_covariance", getattr(source, f"{name}_covariance"))
+    return target
+
+
+def copy_laser_scan(source: Any, target: Any, assign: Callable[[Any, str, Any], None]) -> Any:
+    copy_header(source, target)
+    for name in ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time"):
+        setattr(target, name, getattr(source, name))
+    target.range_min, target.range_max = source.range_min, source.range_max
+    assign(target, "ranges", source.ranges)
+    assign(target, "intensities", source.intensities)
+    return target
+
+
+def assign_to_protobuf(target: Any, name: str, values: Any) -> None:
+    getattr(target, name).extend(values)
+
+
+def assign_to_ros(target: Any, name: str, values: Any) -> None:
+    setattr(target, name, list(values))
+
+
+def serialization_rows(
+    name: str, message: Any, adapter: Any, copy: Callable[..., Any], wanted: str
+) -> Iterator[Row]:
+    """Yield the publish and subscribe paths of a type, without the middleware."""
+    from rclpy.serialization import deserialize_message, serialize_message
+
+    ros_class, custom = type(message), adapter.convert_to_custom(message)
+    data = serialize_message(message)
+    ours, plain, native = seconds(
+        lambda: adapter.to_cdr(custom),
+        lambda: serialize_message(copy(custom, ros_class(), assign_to_ros)),
+        lambda: serialize_message(message),
+    )
+    yield Row(f"{name}: publish", "plain adapter + serialize_message", plain / ours, wanted)
+    yield Row(
+        f"{name}: publish", "serialize_message of the native message", native / ours, ">= 5" * (name == "Imu")
+    )
+    ours, plain, native = seconds(
+        lambda: adapter.from_cdr(data),
+        lambda: copy(deserialize_message(data, ros_class), adapter.custom_type(), assign_to_protobuf),
+        lambda: deserialize_message(data, ros_class),
+    )
+    yield Row(f"{name}: subscribe", "deserialize_message + plain adapter", plain / ours, wanted)
+    yield Row(f"{name}: subscribe", "deserialize_message to the native message", native / ours, "")
+
+
+def object_rows(name: str, message: Any, adapter: Any, copy: Callable[..., Any]) -> Iterator[Row]:
+    """Yield the conversions between objects."""
+    ros_class, custom = type(message), adapter.convert_to_custom(message)
+    ours, plain = seconds(
+        lambda: adapter.convert_to_custom(message),
+        lambda: copy(message, adapter.custom_type(), assign_to_protobuf),
+    )
+    wanted = ">= 10" if name == "LaserScan 720" else ""
+    yield Row(f"{name}: ROS object to protobuf", "attribute by attribute", plain / ours, wanted)
+    ours, plain = seconds(
+        lambda: adapter.convert_to_ros_message(custom),
+        lambda: copy(custom, ros_class(), assign_to_ros),
+    )
+    yield Row(f"{name}: protobuf to ROS object", "attribute by attribute", plain / ours, wanted)
+
+
+def memcpy_rows(message: Any, adapter: Any) -> Iterator[Row]:
+    """Yield what transcoding a large message takes, in times of copying it."""
+    data = adapter.to_cdr(adapter.convert_to_custom(message))
+    proto = adapter.transcoder.cdr_to_proto(data)
+    writable, writable_proto = bytearray(data), bytearray(proto)
+    ours, copy = seconds(lambda: adapter.transcoder.cdr_to_proto(data), lambda: bytes(writable))
+    yield Row("Image 1920x1080: CDR to protobuf, times", "memcpy of the message", ours / copy, "<= 1.5")
+    ours, copy = seconds(lambda: adapter.transcoder.proto_to_cdr(proto), lambda: bytes(writable_proto))
+    yield Row("Image 1920x1080: protobuf to CDR, times", "memcpy of the message", ours / copy, "<= 1.5")
+
+
+def node_rows(messages: dict[str, tuple[Any, Any]]) -> Iterator[Row]:
+    """Yield the processor time per message through a publisher and a subscription of rclpy, native against ours."""
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+
+    from rosidl_adapter_proto.ros import Node
+
+    rclpy.init()
+    node = Node("benchmark")
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    received = [0]
+
+    def receive(_: Any) -> None:
+        received[0] += 1
+
+    def processor_seconds(publisher: Any, message: Any, count: int) -> float:
+        while publisher.get_subscription_count() == 0:
+            executor.spin_once(timeout_sec=0.1)
+        start = time.process_time()
+        for number in range(received[0] + 1, received[0] + 1 + count):
+            publisher.publish(message)
+            while received[0] < number:
+                executor.spin_once(timeout_sec=5.0)
+        return (time.process_time() - start) / count
+
+    for name, (message, adapter) in messages.items():
+        custom = adapter.convert_to_custom(message)
+        sides = []
+        for side, message_type, value in (("native", type(message), message), ("protobuf", adapter, custom)):
+            topic = f"{side}_{name.lower()}"
+            node.create_subscription(message_type, topic, receive, 10)
+            sides.append((node.create_publisher(message_type, topic, 10), value))
+        best = [float("inf")] * 2
+        for _ in range(5):
+            for index, (publisher, value) in enumerate(sides):
+                best[index] = min(best[index], processor_seconds(publisher, value, MESSAGES_PER_TURN[name]))
+        yield Row(
+            f"{name}: publisher to subscription", "native messages, processor time", best[0] / best[1], "> 1"
+        )
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+SIZES = """
+import pickle, sys
+from importlib import import_module
+for name in ("Imu", "LaserScan", "Image", "PoseArray"):
+    package = "geometry_msgs" if name == "PoseArray" else "sensor_msgs"
+    adapter = getattr(import_module(f"rosidl_proto.{package}.msg"), f"{name}Adapter")
+    print(len(adapter.from_cdr(pickle.load(sys.stdin.buffer)).SerializeToString()))
+"""
+
+
+def size_rows(folder: Path, sources: Sources, messages: list[Any]) -> Iterator[tuple[str, int, int, int]]:
+    """Yield bytes per message: CDR, protobuf with hash numbers, protobuf with sequential numbers."""
+    import pickle
+
+    from rclpy.serialization import serialize_message
+
+    data = [serialize_message(message) for message in messages]
+    sizes = {}
+    for numbering in ("hash", "sequential"):
+        options = Options(numbering=numbering, lock_file=folder / "rosidl-proto.lock")
+        generate(Request(("sensor_msgs", "geometry_msgs")), sources, folder / numbering, options)
+        environment = {**os.environ, "PYTHONPATH": str(folder / numbering / "python")}
+        process = subprocess.run(
+            [sys.executable, "-c", SIZES],
+            input=b"".join(map(pickle.dumps, data)),
+            env=environment,
+            stdout=subprocess.PIPE,
+            check=True,
+        )
+        sizes[numbering] = [int(line) for line in process.stdout.split()]
+    for index, message in enumerate(messages):
+        yield type(message).__name__, len(data[index]), sizes["hash"][index], sizes["sequential"][index]
+
+
+def main() -> None:
+    """Measure, and print both tables."""
+    from geometry_msgs.msg import Pose, PoseArray
+
+    sources = Sources((*prefix_sources(), store_source()))
+    with tempfile.TemporaryDirectory() as folder:
+        generate(Request(("sensor_msgs",)), sources, Path(folder, "generated"))
+        sys.path.insert(0, f"{folder}/generated/python")
+        from rosidl_proto.sensor_msgs.msg import ImageAdapter, ImuAdapter, LaserScanAdapter
+
+        imu, scan, image = ros_imu(), ros_laser_scan(), ros_image()
+        print(f"{'work':42} {'against':42} {'ratio':>7}  wanted")
+        for rows in (
+            serialization_rows("Imu", imu, ImuAdapter, copy_imu, ">= 30"),
+            serialization_rows("LaserScan 720", scan, LaserScanAdapter, copy_laser_scan, ">= 50"),
+            memcpy_rows(image, ImageAdapter),
+            object_rows("Imu", imu, ImuAdapter, copy_imu),
+            object_rows("LaserScan 720", scan, LaserScanAdapter, copy_laser_scan),
+            node_rows(
+                {
+                    "Imu": (imu, ImuAdapter),
+                    "LaserScan": (scan, LaserScanAdapter),
+                    "Image": (image, ImageAdapter),
+                }
+            ),
+        ):
+            for row in rows:
+                print(f"{row.work:42} {row.against:42} {row.ratio:7.2f}  {row.wanted}", flush=True)
+
+        print(f"\n{'bytes per message':20} {'CDR':>10} {'hash':>10} {'sequential':>10}")
+        for name, *sizes in size_rows(
+            Path(folder), sources, [imu, scan, image, PoseArray(poses=[Pose()] * 100)]
+        ):
+            print(f"{name:20} " + " ".join(f"{size:10}" for size in sizes))
+
+
+if __name__ == "__main__":
+    main()
