@@ -5,7 +5,10 @@ JAZZY := .venv-jazzy
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test check test-kilted test-jazzy test-oldest benchmark golden format clean
+FUZZ_MUTATIONS ?= 200000
+FUZZ_SECONDS ?= 600
+
+.PHONY: demo test check test-kilted test-jazzy test-fuzz fuzz benchmark golden format clean
 
 # What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
 KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
@@ -24,7 +27,7 @@ $(JAZZY)/ready: pyproject.toml
 demo: $(VENV)/ready
 	$(BIN)/python examples/demo.py
 
-test: check test-kilted test-jazzy
+test: check test-kilted test-jazzy test-fuzz
 
 check: $(VENV)/ready
 	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks
@@ -37,8 +40,26 @@ test-kilted: $(VENV)/ready
 test-jazzy: $(JAZZY)/ready
 	$(JAZZY)/bin/python -m pytest
 
+# A bounded number of mutated messages through the native core, with sanitizers; any compiler will do.
+test-fuzz: $(VENV)/ready
+	$(BIN)/cmake -S . -B build/fuzz -DROSIDL_PROTO_FUZZ=ON -DROSIDL_PROTO_PYTHON=OFF
+	$(BIN)/cmake --build build/fuzz
+	$(BIN)/python core/fuzz/make_corpus.py build/fuzz/corpus
+	ROSIDL_PROTO_FUZZ_PLAN=build/fuzz/corpus/plan.bin \
+	  build/fuzz/core/fuzz/fuzz_driver $(FUZZ_MUTATIONS) build/fuzz/corpus/inputs/*
+
+# Coverage-guided, for as long as FUZZ_SECONDS says; needs clang.
+fuzz: $(VENV)/ready
+	$(BIN)/cmake -S . -B build/fuzz-clang -DROSIDL_PROTO_FUZZ=ON -DROSIDL_PROTO_PYTHON=OFF \
+	  -DCMAKE_CXX_COMPILER=clang++
+	$(BIN)/cmake --build build/fuzz-clang
+	$(BIN)/python core/fuzz/make_corpus.py build/fuzz-clang/corpus
+	ROSIDL_PROTO_FUZZ_PLAN=build/fuzz-clang/corpus/plan.bin \
+	  build/fuzz-clang/core/fuzz/fuzz_transcode -max_total_time=$(FUZZ_SECONDS) build/fuzz-clang/corpus/inputs
+
 benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/generate.py
+	$(BIN)/python benchmarks/messages.py
 
 golden: $(VENV)/ready
 	$(BIN)/python -m pytest tests/generate/test_golden.py --update-golden
