@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, NoReturn, 
 from google.protobuf import descriptor_pool
 from google.protobuf.message import Message
 
-from rosidl_adapter_proto.errors import ConversionError, Error
+from rosidl_adapter_proto.errors import ConversionError, Error, wrong_message
 
 if TYPE_CHECKING:
     from google.protobuf.descriptor import FileDescriptor
@@ -79,7 +79,11 @@ class _Transcoder:
     def __get__(self, instance: object, owner: type[TypeAdapter[Any, Any]]) -> Transcoder:
         from rosidl_adapter_proto.transcode import Transcoder
 
-        owner.transcoder = Transcoder(owner.type_description(), owner.custom_type.DESCRIPTOR)
+        descriptor, message_class = owner.custom_type.DESCRIPTOR, owner.custom_type
+        owner.transcoder = Transcoder(owner.type_description(), descriptor, message_class=message_class)
+        # From now on these are the native methods themselves.
+        owner.to_cdr = owner.transcoder.message_to_cdr  # type: ignore[assignment, method-assign]
+        owner.from_cdr = owner.transcoder.cdr_to_message  # type: ignore[method-assign]
         return owner.transcoder
 
 
@@ -183,9 +187,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         Raises:
             ConversionError: A value does not fit; it is a `TranscodeError`, which has the place in the bytes as well.
         """
-        if type(source) is not cls.custom_type:
-            check_custom(source, cls)
-        return cls.transcoder.proto_to_cdr(source.SerializeToString())
+        return cls.transcoder.message_to_cdr(source)
 
     @classmethod
     def from_cdr(cls, data: Buffer) -> CustomT:
@@ -194,7 +196,8 @@ class TypeAdapter(Generic[CustomT, RosT]):
         Raises:
             ConversionError: The bytes are not a valid message of the type; it is a `TranscodeError`.
         """
-        return cls.custom_type.FromString(cls.transcoder.cdr_to_proto(data))
+        message: CustomT = cls.transcoder.cdr_to_message(data)
+        return message
 
     @classmethod
     def new(cls, **fields: Any) -> CustomT:
@@ -316,9 +319,7 @@ def conversion_error(type_name: str, field: str, error: Exception) -> Conversion
 def check_custom(source: object, adapter: type[TypeAdapter[Any, Any]]) -> None:
     """Refuse to read anything but a message of the adapter's protobuf class."""
     if not isinstance(source, adapter.custom_type):
-        expected = adapter.custom_type.DESCRIPTOR.full_name
-        found = f"{type(source).__module__}.{type(source).__qualname__}"
-        raise ConversionError(adapter.type_name, "", f"expected a protobuf message {expected}, not {found}")
+        raise wrong_message(adapter.type_name, adapter.custom_type.DESCRIPTOR.full_name, source)
 
 
 def finish_custom(message: CustomT, destination: CustomT | None) -> CustomT:

@@ -49,3 +49,13 @@ class ConversionError(Error):
 
     def __reduce__(self) -> tuple[type[ConversionError], tuple[Any, ...]]:
         return type(self), (self.type_name, self.field_path, self.reason)
+
+
+def wrong_message(type_name: str, expected: str, found: object) -> ConversionError:
+    """Return the error for an object that is not the protobuf message of a type."""
+    found_class = type(found)
+    return ConversionError(
+        type_name,
+        "",
+        f"expected a protobuf message {expected}, not {found_class.__module__}.{found_class.__qualname__}",
+    )

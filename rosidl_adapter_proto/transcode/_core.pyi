@@ -1,7 +1,9 @@
 """The native transcoder: CDR to protobuf and back."""
 
 from collections.abc import Sequence
+from typing import Any
 
+from google.protobuf.message import Message
 from typing_extensions import Buffer
 
 def packed_fields(message: bytes, *numbers: int) -> tuple[bytes, ...]:
@@ -16,10 +18,18 @@ def packed_fields(message: bytes, *numbers: int) -> tuple[bytes, ...]:
     """
 
 class Transcoder:
-    def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...
+    def __init__(
+        self, plan: bytes, type_name: str, size_limit: int, message_class: type[Message] | None
+    ) -> None: ...
     @property
     def type_name(self) -> str:
         """The ROS type, such as `sensor_msgs/msg/Imu`."""
+
+    def message_to_cdr(self, message: Message) -> bytes:
+        """Turn a protobuf message into a serialized ROS message."""
+
+    def cdr_to_message(self, data: Buffer) -> Any:
+        """Turn a serialized ROS message into a protobuf message."""
 
     def cdr_to_proto(self, data: Buffer) -> bytes:
         """Turn a serialized ROS message into a serialized protobuf message."""
