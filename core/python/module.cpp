@@ -298,7 +298,7 @@ NB_MODULE(_core, module) {
              "Return the bytes of packed repeated fields of a serialized message, by their numbers.");
   nb::class_<Transcoder>(module, "Transcoder")
       .def(nb::init<nb::bytes, std::string, uint64_t, nb::object>(), nb::arg("plan"), nb::arg("type_name"),
-           nb::arg("size_limit"), nb::arg("message_class").none())
+           nb::arg("size_limit"), nb::arg("message_class") = nb::none())
       .def("message_to_cdr", &Transcoder::message_to_cdr, nb::arg("message"),
            "Turn a protobuf message into a serialized ROS message.")
       .def("cdr_to_message", &Transcoder::cdr_to_message, nb::arg("data"),

@@ -19,7 +19,7 @@ def packed_fields(message: bytes, *numbers: int) -> tuple[bytes, ...]:
 
 class Transcoder:
     def __init__(
-        self, plan: bytes, type_name: str, size_limit: int, message_class: type[Message] | None
+        self, plan: bytes, type_name: str, size_limit: int, message_class: type[Message] | None = None
     ) -> None: ...
     @property
     def type_name(self) -> str:
