@@ -10,7 +10,7 @@ import importlib
 import sys
 from array import array
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, NoReturn, TypeVar
 
@@ -527,13 +527,14 @@ def packed_fields(message: Message, *field_numbers: int) -> tuple[bytes, ...]:
 
     Serializing the whole message and finding them in it takes less time than asking protobuf for a single one.
     """
-    fields: tuple[bytes, ...] = _native().packed_fields(message.SerializeToString(), *field_numbers)
+    fields: tuple[bytes, ...] = _native_packed_fields(type(message))(message, *field_numbers)
     return fields
 
 
 @cache
-def _native() -> Any:
-    return importlib.import_module("rosidl_adapter_proto.transcode._core")
+def _native_packed_fields(message_class: Any) -> Callable[..., tuple[bytes, ...]]:
+    native = importlib.import_module("rosidl_adapter_proto.transcode._core")
+    return partial(native.packed_fields, message_class.SerializeToString)
 
 
 def array_of(data: bytes, typecode: str) -> Any:

@@ -268,7 +268,10 @@ class Transcoder {
   nb::object message_class_, from_string_, serialize_;
 };
 
-nb::tuple packed_fields(nb::bytes message, nb::args numbers) {
+nb::tuple packed_fields(nb::handle serialize, nb::handle object, nb::args numbers) {
+  const nb::object serialized = nb::steal(PyObject_CallOneArg(serialize.ptr(), object.ptr()));
+  if (!serialized.is_valid()) throw nb::python_error();
+  const auto message = nb::cast<nb::bytes>(serialized);
   std::vector<uint64_t> wanted(numbers.size());
   std::vector<Slice> slices(numbers.size());
   for (size_t i = 0; i < wanted.size(); ++i) wanted[i] = nb::cast<uint64_t>(numbers[i]);
@@ -294,8 +297,8 @@ NB_MODULE(_core, module) {
   module.doc() = "The native transcoder: CDR to protobuf and back.";
   // Transcoders live as long as the classes that hold them, which is as long as the interpreter.
   nb::set_leak_warnings(false);
-  module.def("packed_fields", &packed_fields, nb::arg("message"), nb::arg("numbers"),
-             "Return the bytes of packed repeated fields of a serialized message, by their numbers.");
+  module.def("packed_fields", &packed_fields, nb::arg("serialize"), nb::arg("message"), nb::arg("numbers"),
+             "Return the bytes of packed repeated fields of a message, by their numbers.");
   nb::class_<Transcoder>(module, "Transcoder")
       .def(nb::init<nb::bytes, std::string, uint64_t, nb::object>(), nb::arg("plan"), nb::arg("type_name"),
            nb::arg("size_limit"), nb::arg("message_class") = nb::none())

@@ -1,20 +1,23 @@
 """The native transcoder: CDR to protobuf and back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from google.protobuf.message import Message
 from typing_extensions import Buffer
 
-def packed_fields(message: bytes, *numbers: int) -> tuple[bytes, ...]:
-    """Return the bytes of packed repeated fields of a serialized message, by their numbers.
+def packed_fields(
+    serialize: Callable[[Message], bytes], message: Message, *numbers: int
+) -> tuple[bytes, ...]:
+    """Return the bytes of packed repeated fields of a message, by their numbers.
 
     Args:
-        message: A message as protobuf runtimes serialize it: each field once, in packed form, and no groups.
+        serialize: Serializes the message as protobuf runtimes do: each field once, in packed form, and no groups.
+        message: The message.
         numbers: The numbers of the fields; one that is absent has no bytes.
 
     Raises:
-        ValueError: The message is not of this form.
+        ValueError: The serialized message is not of this form.
     """
 
 class Transcoder:
