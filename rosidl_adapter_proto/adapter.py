@@ -527,8 +527,8 @@ def packed_fields(message: Message, *field_numbers: int) -> tuple[bytes, ...]:
 
     Serializing the whole message and finding them in it takes less time than asking protobuf for a single one.
     """
-    fields: tuple[bytes, ...] = _native_packed_fields(type(message))(message, *field_numbers)
-    return fields
+    message_class: Any = type(message)
+    return _native_packed_fields(message_class)(message, *field_numbers)
 
 
 @cache
