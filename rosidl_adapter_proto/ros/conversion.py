@@ -50,6 +50,26 @@ def deserialize(adapter: type[TypeAdapter[CustomT, Any]], data: bytes) -> Custom
     return custom
 
 
+def takes_ros_messages(adapter: type[TypeAdapter[Any, Any]]) -> bool:
+    """Return whether a subscription should take ROS messages, instead of serialized ones for the transcoder.
+
+    rclpy copies serialized messages more often than others. For an image that costs more than all else, and the bytes
+    of a ROS message are converted by a single copy.
+    """
+    return _is_generated(adapter) and _has_bytes(adapter)  # type: ignore[arg-type]
+
+
+# Unbounded sequences of uint8, int8 and octets in type_description_interfaces/msg/FieldType.
+_BYTES = (147, 146, 160)
+
+
+def _has_bytes(adapter: Any) -> bool:
+    return any(
+        info.type_id in _BYTES or (info.nested is not None and _has_bytes(info.nested))
+        for info in adapter.fields
+    )
+
+
 @cache
 def _is_generated(adapter: type) -> bool:
     """Return whether the conversions of an adapter belong to its fields, so that the transcoder does the same.
@@ -105,6 +125,7 @@ class Reception(Generic[CustomT]):
         convert: Callable[[Any], CustomT],
         on_conversion_error: OnConversionError | None = None,
         explain: Callable[[], str] = lambda: "",
+        received_type: type = object,
     ) -> None:
         """Make the reception of a source.
 
@@ -114,6 +135,8 @@ class Reception(Generic[CustomT]):
             convert: Converts one, or raises a ConversionError.
             on_conversion_error: Is called instead of reporting.
             explain: Returns what else there is to say about an error, or nothing.
+            received_type: What rclpy passes to a callback; anything else, from a user who calls it, is passed on as it
+                is.
         """
         self.conversion_errors = 0
         self._node = node
@@ -121,6 +144,7 @@ class Reception(Generic[CustomT]):
         self._convert = convert
         self._on_conversion_error = on_conversion_error
         self._explain = explain
+        self._received_type = received_type
         self._next_report = 0.0
         self._lock = threading.Lock()
 
@@ -147,7 +171,7 @@ class Reception(Generic[CustomT]):
                 f"({self.conversion_errors} dropped so far)"
             )
 
-    def callback(self, callback: Callable[..., Any], received_type: type = object) -> Callable[..., Any]:
+    def callback(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         """Return the callback for rclpy that converts its first argument and then calls the user's.
 
         rclpy looks at a callback's signature, to know whether it takes a MessageInfo, and at whether it is a coroutine
@@ -155,11 +179,10 @@ class Reception(Generic[CustomT]):
 
         Args:
             callback: The user's callback.
-            received_type: What rclpy passes; anything else, from a user who calls it, is passed on as it is.
         """
 
         def accept(message: Any) -> Any:
-            return self(message) if isinstance(message, received_type) else message
+            return self(message) if isinstance(message, self._received_type) else message
 
         async def await_callback(received: Any, *others: Any) -> Any:
             message = accept(received)

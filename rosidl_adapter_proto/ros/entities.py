@@ -67,8 +67,9 @@ class LifecyclePublisher(rclpy.lifecycle.LifecyclePublisher, Publisher[CustomT])
 class Subscription(rclpy.subscription.Subscription, Generic[CustomT]):
     """A subscription to protobuf messages.
 
-    The executor hands `callback` serialized messages (so `raw` is true), which it converts for the user's callback:
-    `callback.__wrapped__`. Called with a protobuf message, it passes that on, and so a callback can be tried by hand.
+    The executor hands `callback` serialized messages (`raw` is true), or ROS messages if the type holds sequences of
+    bytes, as images do. They are converted for the user's callback: `callback.__wrapped__`. Called with a protobuf
+    message, it passes that on, and so a callback can be tried by hand.
 
     Attributes:
         adapter: Converts the messages.
@@ -90,7 +91,7 @@ class Subscription(rclpy.subscription.Subscription, Generic[CustomT]):
 
     @callback.setter
     def callback(self, value: Callable[..., Any]) -> None:
-        rclpy.subscription.Subscription.callback.fset(self, self._reception.callback(value, bytes))  # type: ignore[attr-defined]
+        rclpy.subscription.Subscription.callback.fset(self, self._reception.callback(value))  # type: ignore[attr-defined]
 
 
 class _NoResponse:
