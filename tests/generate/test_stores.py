@@ -72,6 +72,9 @@ for name in types.fielddefs:
     custom = adapter.convert_to_custom(made)
     assert adapter.custom_type.FromString(custom.SerializeToString()) == custom
     check(made, custom, name)
+    data = bytes(types.serialize_cdr(made, name))
+    assert adapter.from_cdr(data) == custom, name
+    check(types.deserialize_cdr(adapter.to_cdr(custom), name), custom, name)
 print(len(types.fielddefs))
 """
 
