@@ -360,30 +360,34 @@ def float32(value: float) -> float:
     raise ValueError(f"{value} is too large for a float32")
 
 
-def at_most(values: SizedT, bound: int, what: str = "elements") -> SizedT:
+def at_most(values: SizedT, bound: int, what: str = "element") -> SizedT:
     """Return values that are not more than the bound."""
     if len(values) > bound:
-        raise ValueError(f"{len(values)} {what}, more than the bound of {bound}")
+        raise ValueError(f"{_count(len(values), what)}, more than the bound of {bound}")
     return values
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def exactly(values: SizedT, size: int) -> SizedT:
     """Return values that are as many as the array is long."""
     if len(values) != size:
-        raise ValueError(f"{len(values)} elements, but the array has {size}")
+        raise ValueError(f"{_count(len(values), 'element')}, but the array has {size}")
     return values
 
 
 def absent_or_exactly(values: SizedT, size: int) -> SizedT:
     """Return the values of an array in protobuf: none, which stands for zeros, or all."""
     if len(values) not in (0, size):
-        raise ValueError(f"{len(values)} elements, but the array has {size} (or none, for zeros)")
+        raise ValueError(f"{_count(len(values), 'element')}, but the array has {size} (or none, for zeros)")
     return values
 
 
 def text(value: str, bound: int) -> str:
     """Return a string of at most `bound` characters."""
-    return at_most(value, bound, "characters")
+    return at_most(value, bound, "character")
 
 
 def each(convert: Callable[[Any], Any], values: Iterable[Any]) -> list[Any]:

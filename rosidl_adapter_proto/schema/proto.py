@@ -239,14 +239,18 @@ def facts(field: Field) -> list[str]:
         lowest, highest = integer_range(element.name)
         lines.append(f"Values from {lowest} to {highest}.")
     if isinstance(element, StringType) and element.bound is not None:
-        lines.append(f"At most {element.bound} characters.")
+        lines.append(f"At most {_count(element.bound, 'character')}.")
     if isinstance(field.type, ArrayType):
-        lines.append(f"Exactly {field.type.size} elements.")
+        lines.append(f"Exactly {_count(field.type.size, 'element')}.")
     if isinstance(field.type, SequenceType) and field.type.bound is not None:
-        lines.append(f"At most {field.type.bound} elements.")
+        lines.append(f"At most {_count(field.type.bound, 'element')}.")
     if field.default is not None:
         lines.append(f"Default in ROS: {_literal(field.default)}")
     return lines
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 _NARROW_TYPES = ("int8", "uint8", "int16", "uint16", "octet")

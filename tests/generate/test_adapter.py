@@ -156,7 +156,7 @@ def bad_part(**header: Any) -> SimpleNamespace:
         ({"two_doubles": [1.0, 2.0, 3.0]}, "two_doubles: 3 elements, but the array has 2"),
         ({"few": [1, -1]}, "few[1]: -1 is not in the range from 0 to 4294967295"),
         ({"few": [1, 2, 3]}, "few: 3 elements, more than the bound of 2"),
-        ({"flags": [True]}, "flags: 1 elements, but the array has 2"),
+        ({"flags": [True]}, "flags: 1 element, but the array has 2"),
         ({"flags": [True, 3]}, "flags[1]: expected bool, not 3"),
         ({"names": ["a", None]}, "names[1]: expected str, not NoneType"),
         ({"wides": ["a", "\udc00"]}, "wides[1]: 'utf-16-le' codec can't encode *"),
@@ -223,19 +223,19 @@ def test_round_trip_with_any_class(package: SimpleNamespace, fake_ros: Any) -> N
         ({"short_wide": b"a\0b\0c\0"}, "short_wide: 3 characters, more than the bound of 2"),
         ({"blob": b"12345"}, "blob: 5 elements, more than the bound of 4"),
         ({"shorts": [1, -32769]}, "shorts[1]: -32769 is not in the range from -32768 to 32767"),
-        ({"three_shorts": [1]}, "three_shorts: 1 elements, but the array has 3 (or none, for zeros)"),
+        ({"three_shorts": [1]}, "three_shorts: 1 element, but the array has 3 (or none, for zeros)"),
         (
             {"three_shorts": [1, 2, 1 << 16]},
             "three_shorts[2]: 65536 is not in the range from -32768 to 32767",
         ),
-        ({"two_doubles": [1]}, "two_doubles: 1 elements, but the array has 2 (or none, for zeros)"),
+        ({"two_doubles": [1]}, "two_doubles: 1 element, but the array has 2 (or none, for zeros)"),
         ({"few": [1, 2, 3]}, "few: 3 elements, more than the bound of 2"),
-        ({"flags": [True]}, "flags: 1 elements, but the array has 2 (or none, for zeros)"),
+        ({"flags": [True]}, "flags: 1 element, but the array has 2 (or none, for zeros)"),
         (
             {"wides": [b"", b"x"]},
             "wides[1]: 'utf-16-le' codec can't decode byte 0x78 in position 0: truncated data",
         ),
-        ({"two_parts": [{}]}, "two_parts: 1 elements, but the array has 2 (or none, for zeros)"),
+        ({"two_parts": [{}]}, "two_parts: 1 element, but the array has 2 (or none, for zeros)"),
     ],
 )
 def test_bad_protobuf_values(
