@@ -135,6 +135,13 @@ class TypeAdapter(Generic[CustomT, RosT]):
         transcoder = _Transcoder()
     ros_class: ClassVar[str]
 
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Let a class that derives from an adapter in use have a transcoder of its own."""
+        super().__init_subclass__(**arguments)
+        for name in ("transcoder", "to_cdr", "from_cdr"):
+            if name not in vars(cls):
+                setattr(cls, name, vars(TypeAdapter)[name])
+
     @staticmethod
     def convert_to_ros_message(source: CustomT, destination: RosT | None = None) -> RosT:
         """Convert a protobuf message to a ROS message.

@@ -19,7 +19,7 @@ import numpy
 import pytest
 
 from rosidl_adapter_proto.adapter import RosNotFoundError, add_descriptor_file
-from rosidl_adapter_proto.errors import ConversionError
+from rosidl_adapter_proto.errors import ConversionError, SchemaError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.sources import Sources, folder_source, store_source
 
@@ -351,6 +351,18 @@ def test_package_exports(package: SimpleNamespace) -> None:
     assert set(package.srv.__all__) <= set(dir(package.srv))
     with pytest.raises(AttributeError, match="has no attribute 'Nonsense'"):
         _ = package.srv.Nonsense
+
+
+def test_an_adapter_derived_from_one_in_use(package: SimpleNamespace) -> None:
+    part = package.msg.Part(x=1)
+    data = package.msg.PartAdapter_.to_cdr(part)
+
+    class Derived(package.msg.PartAdapter_):  # type: ignore[misc, name-defined]
+        custom_type = package.msg.PartAdapter
+
+    with pytest.raises(SchemaError):  # its class has other fields
+        Derived.from_cdr(data)
+    assert package.msg.PartAdapter_.from_cdr(data).x == 1
 
 
 def test_empty_message(package: SimpleNamespace) -> None:
