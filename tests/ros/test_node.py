@@ -101,11 +101,17 @@ def test_adapters_of_other_protobuf_classes(node: Any, adapter: Any) -> None:
 
     from rosidl_adapter_proto.ros import AdapterNotFoundError
 
+    def message_class(name: str) -> Any:
+        descriptor = pool.FindMessageTypeByName(name)
+        if hasattr(message_factory, "GetMessageClass"):
+            return message_factory.GetMessageClass(descriptor)
+        return message_factory.MessageFactory(pool).GetPrototype(descriptor)  # before protobuf 4.22
+
     pool = descriptor_pool.DescriptorPool()
     file = descriptor_pb2.FileDescriptorProto(name="mine/Text.proto", package="mine", syntax="proto3")
     file.message_type.add(name="Text").field.add(name="text", number=1, type=9, label=1)
-    pool.Add(file)
-    text_class = message_factory.GetMessageClass(pool.FindMessageTypeByName("mine.Text"))
+    pool.AddSerializedFile(file.SerializeToString())
+    text_class = message_class("mine.Text")
 
     with pytest.raises(AdapterNotFoundError, match=r"Text has no adapter for a message"):
         node.create_publisher(text_class, "mine", 10)
@@ -135,10 +141,8 @@ def test_adapters_of_other_protobuf_classes(node: Any, adapter: Any) -> None:
 
     other_file = descriptor_pb2.FileDescriptorProto(name="mine/More.proto", package="more", syntax="proto3")
     other_file.message_type.add(name="More")
-    pool.Add(other_file)
-    TextAdapter.custom_type = OtherAdapter.custom_type = message_factory.GetMessageClass(
-        pool.FindMessageTypeByName("more.More")
-    )
+    pool.AddSerializedFile(other_file.SerializeToString())
+    TextAdapter.custom_type = OtherAdapter.custom_type = message_class("more.More")
     with pytest.raises(AdapterNotFoundError, match=r"TextAdapter and .*OtherAdapter; pass the one to use"):
         node.create_publisher(TextAdapter.custom_type, "mine", 10)
 
