@@ -207,7 +207,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         return message
 
     @classmethod
-    def new(cls, **fields: Any) -> CustomT:
+    def new(cls, /, **fields: Any) -> CustomT:
         """Make a protobuf message with the default values of the ROS definition, which proto3 cannot carry.
 
         Args:
@@ -408,6 +408,16 @@ def each(convert: Callable[[Any], Any], values: Iterable[Any]) -> list[Any]:
     return converted
 
 
+def sequence(values: Iterable[Any]) -> Iterable[Any]:
+    """Return the values of a sequence; a single string, or what has no order, is none."""
+    if isinstance(values, _NO_SEQUENCES):
+        raise TypeError(f"expected a sequence, not {type(values).__name__}")
+    return values
+
+
+_NO_SEQUENCES = (str, bytes, bytearray, memoryview, set, frozenset, Mapping)
+
+
 def string(value: object) -> str:
     """Return a string; anything else is an error."""
     if isinstance(value, str):
@@ -489,6 +499,9 @@ _NUMPY_TYPES = {
 }
 
 
+_BYTES = (bytes, bytearray, memoryview)
+
+
 def numbers(values: Any, typecode: str) -> Any:
     """Return numbers as an array (`array.array` or numpy) of the C type that `typecode` names in `array`."""
     if type(values) is array and values.typecode == typecode:
@@ -496,8 +509,10 @@ def numbers(values: Any, typecode: str) -> Any:
     dtype = getattr(values, "dtype", None)
     if dtype is not None and dtype.str == _NUMPY_TYPES[typecode] and values.ndim == 1:
         return values
-    if isinstance(values, (str, bytes, bytearray, memoryview)) and typecode not in "bB":
+    if isinstance(values, _NO_SEQUENCES) and not (typecode in "bB" and isinstance(values, _BYTES)):
         raise TypeError(f"expected a sequence of numbers, not {type(values).__name__}")
+    if dtype is not None and dtype.kind == "c":
+        raise TypeError("expected real numbers, not complex ones")
     if typecode == "f":
         return array("f", each(float32, values))
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import keyword
+import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -167,8 +168,7 @@ def _generate_files(
     from rosidl_adapter_proto.generate.python import Names, python_modules
     from rosidl_adapter_proto.generate.render import render, render_modules, render_packages
 
-    if keyword.iskeyword(options.python_root) or not options.python_root.isidentifier():
-        raise GenerateError(f"{options.python_root!r} cannot be the name of a Python package")
+    _check_python_root(options.python_root)
     protos = [
         proto_file(
             sources.definition(name).interface, numbering, sources.definition_name, events=options.events
@@ -187,8 +187,19 @@ def _generate_files(
         files.update(content)
         if progress:
             progress(done, len(modules))
-    files.update(render_packages(modules, options.python_root))
+    requested = {*request.packages, *(name.package for name in request.types)}
+    files.update(render_packages(modules, options.python_root, requested))
     return files
+
+
+def _check_python_root(name: str) -> None:
+    taken = {*sys.stdlib_module_names, "rosidl_adapter_proto"}
+    if keyword.iskeyword(name) or not name.isidentifier():
+        raise GenerateError(f"{name!r} cannot be the name of a Python package")
+    if name in taken:
+        raise GenerateError(
+            f"{name!r} is the name of another Python package; choose one for --python-root alone"
+        )
 
 
 def _is_wanted(name: TypeName, request: Request) -> bool:

@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.interfaces.description import field_type_description
 from rosidl_adapter_proto.interfaces.model import (
@@ -191,6 +192,16 @@ class PythonModules:
     stubs: tuple[StubMessage, ...]
 
     @property
+    def stub_imports(self) -> tuple[tuple[str, str], ...]:
+        """The modules that the type stub imports, and what each is called there."""
+        return tuple((module, _stub_alias(module)) for module in self.pb2_imports)
+
+    @property
+    def has_containers(self) -> bool:
+        """Whether the type stub has a repeated field."""
+        return any("_containers." in field.type for message in self.stubs for field in message.fields)
+
+    @property
     def exports(self) -> dict[str, str]:
         """Every public name and the module, relative to the package, that has it."""
         adapters = [each.class_name for each in self.messages] + [each.class_name for each in self.groups]
@@ -281,7 +292,9 @@ def _message_adapter(
         ros_class=_ros_class(message.name, interface),
         comment=_docstring_lines(message.comment),
         constants=tuple(
-            AdapterConstant(each.name, _python_literal(each.value), _plain_lines(each.comment))
+            AdapterConstant(
+                _constant_name(each.name), _python_literal(each.value), _plain_lines(each.comment)
+            )
             for each in message.constants
         ),
         packed_numbers=packed_numbers,
@@ -289,6 +302,11 @@ def _message_adapter(
         defaults=_defaults(message),
         has_defaults=_has_defaults(message, names),
     )
+
+
+def _constant_name(name: str) -> str:
+    """Return the attribute of a constant; not one that adapters have already, as an `.idl` may name it."""
+    return f"{name}_" if hasattr(TypeAdapter, name) or name in TypeAdapter.__annotations__ else name
 
 
 def _ros_class(name: TypeName, interface: Interface) -> str:
@@ -511,6 +529,7 @@ def _list(
         to_custom_line = _assign(field.name, to_custom)
     else:
         convert, convert_back = _scalar(element)
+        checked = f"sequence({checked})"
         if isinstance(element, BasicType):
             zero = "False" if element.name == "boolean" else "0.0"
         to_custom_line = f"{target}.extend({_each(convert, checked)})"
@@ -639,7 +658,7 @@ def _stub_field(proto: ProtoField, interface: Interface, names: Names) -> StubFi
     if isinstance(element, TypeName):
         plain = element.name
         if names.sources.definition_name(element) != interface.name:
-            plain = f"{names.module(element, 'pb2')}.{element.name}"
+            plain = f"{_stub_alias(names.module(element, 'pb2'))}.{element.name}"
         read = f"_containers.RepeatedCompositeFieldContainer[{plain}]" if proto.repeated else plain
         argument = f"_typing.Iterable[{plain}]" if proto.repeated else plain
     else:
@@ -655,6 +674,11 @@ def _stub_field(proto: ProtoField, interface: Interface, names: Names) -> StubFi
         argument,
         _docstring_lines(proto.comment),
     )
+
+
+def _stub_alias(module: str) -> str:
+    """Return what a module is called in a type stub: no field can be called so, as the package itself could be."""
+    return "_" + "_".join(module.split(".")[-3:])
 
 
 def _plain_lines(lines: Iterable[str]) -> tuple[str, ...]:

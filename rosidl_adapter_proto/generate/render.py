@@ -89,8 +89,16 @@ def _render_module(modules: PythonModules, serialized: bytes) -> dict[str, bytes
     return {path: text.encode() for path, text in texts.items()}
 
 
-def render_packages(modules: Iterable[PythonModules], python_root: str) -> dict[str, bytes]:
-    """Return what packages have beside the modules: `__init__.py`, `py.typed`, and the project file of the folder."""
+def render_packages(
+    modules: Iterable[PythonModules], python_root: str, requested: Iterable[str]
+) -> dict[str, bytes]:
+    """Return what packages have beside the modules: `__init__.py`, `py.typed`, and the project file of the folder.
+
+    Args:
+        modules: The modules of all packages.
+        python_root: The namespace package that they are in.
+        requested: The packages that were asked for; the project is named after them.
+    """
     exports: dict[str, dict[str, str]] = {}
     for each in modules:
         exports.setdefault(each.package, {}).update(each.exports)
@@ -101,11 +109,7 @@ def render_packages(modules: Iterable[PythonModules], python_root: str) -> dict[
         files[f"{folder}/__init__.py"] = text.encode()
         files[f"{folder}/py.typed"] = b""
     packages = sorted({package.split(".")[-2] for package in exports})
-    name = (
-        "-".join(["rosidl-proto", *(part.replace("_", "-") for part in packages)])
-        if len(packages) == 1
-        else "rosidl-proto-interfaces"
-    )
+    name = "-".join([python_root, *sorted(requested)]).replace("_", "-")
     files["pyproject.toml"] = render(
         "python/pyproject.toml.jinja", name=name, packages=packages, python_root=python_root
     ).encode()

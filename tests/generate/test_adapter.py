@@ -19,7 +19,7 @@ import numpy
 import pytest
 
 from rosidl_adapter_proto.adapter import RosNotFoundError, add_descriptor_file
-from rosidl_adapter_proto.errors import ConversionError, SchemaError
+from rosidl_adapter_proto.errors import ConversionError, GenerateError, SchemaError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.sources import Sources, folder_source, store_source
 
@@ -67,6 +67,12 @@ float32 LIMIT=inf
     "msg/Header.msg": "std_msgs/Header header\nHeader2 other\n",
     "msg/Header2.msg": f"int32 x_1\n{'int32 x1' if PROTOC_TAKES_JSON_CONFLICTS else ''}\nint32 self\nint32 int\n",
     "msg/Nothing.msg": "",
+    "msg/Taken.idl": """
+        module things { module msg {
+            module Taken_Constants { const long fields = 3; const long new = 4; const long custom_type = 5; };
+            struct Taken { long cls; };
+        }; };
+    """,
     "srv/Set.srv": "int8 a 1\nint8 A=3\n---\nbool ok\n",
     "action/Go.action": "int32 order\n---\nint32[] sequence\n---\nfloat32 part\n",
 }
@@ -158,6 +164,9 @@ def bad_part(**header: Any) -> SimpleNamespace:
         ({"few": [1, 2, 3]}, "few: 3 elements, more than the bound of 2"),
         ({"flags": [True]}, "flags: 1 element, but the array has 2"),
         ({"flags": [True, 3]}, "flags[1]: expected bool, not 3"),
+        ({"names": "ab"}, "names: expected a sequence, not str"),
+        ({"two_doubles": {1.0, 2.0}}, "two_doubles: expected a sequence of numbers, not set"),
+        ({"singles": numpy.ones(2, complex)}, "singles: expected real numbers, not complex ones"),
         ({"names": ["a", None]}, "names[1]: expected str, not NoneType"),
         ({"wides": ["a", "\udc00"]}, "wides[1]: 'utf-16-le' codec can't encode *"),
         ({"part": None}, "part.x: 'NoneType' object has no attribute 'x'"),
@@ -314,6 +323,26 @@ def test_constants(package: SimpleNamespace) -> None:
     assert adapter.NAME == "x"
     assert math.isinf(adapter.LIMIT)
     assert package.srv.Set_RequestAdapter.A == 3
+
+
+def test_names_that_adapters_use_themselves(package: SimpleNamespace) -> None:
+    adapter = package.msg.TakenAdapter
+    assert (adapter.fields_, adapter.new_, adapter.custom_type_) == (3, 4, 5)
+    assert adapter.new(cls=1) == package.msg.Taken(cls=1)
+
+
+def test_projects_are_named_after_what_was_asked_for(package: SimpleNamespace) -> None:
+    assert 'name = "things-root-things"' in (package.folder / "pyproject.toml").read_text()
+
+
+@pytest.mark.parametrize("name", ["types", "rosidl_adapter_proto", "class", "a-b"])
+def test_python_roots_that_cannot_be(name: str, tmp_path: Path) -> None:
+    with pytest.raises(
+        GenerateError, match=rf"'{name}' (is|cannot be) the name of a(nother)? Python package"
+    ):
+        generate(
+            Request(("std_msgs",)), Sources((store_source(),)), tmp_path / "out", Options(python_root=name)
+        )
 
 
 def test_names_that_collide(package: SimpleNamespace) -> None:

@@ -5,10 +5,9 @@ import typing as _typing
 
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
-from google.protobuf.internal import containers as _containers
 
-import rosidl_proto.builtin_interfaces.msg.Time_pb2
-import rosidl_proto.unique_identifier_msgs.msg.UUID_pb2
+import rosidl_proto.builtin_interfaces.msg.Time_pb2 as _builtin_interfaces_msg_Time_pb2
+import rosidl_proto.unique_identifier_msgs.msg.UUID_pb2 as _unique_identifier_msgs_msg_UUID_pb2
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
@@ -57,13 +56,13 @@ class Move_Feedback(_message.Message):
 @_typing.final
 class Move_SendGoal_Request(_message.Message):
     @_builtins.property
-    def goal_id(self) -> rosidl_proto.unique_identifier_msgs.msg.UUID_pb2.UUID: ...
+    def goal_id(self) -> _unique_identifier_msgs_msg_UUID_pb2.UUID: ...
     @_builtins.property
     def goal(self) -> Move_Goal: ...
     def __init__(
         self,
         *,
-        goal_id: rosidl_proto.unique_identifier_msgs.msg.UUID_pb2.UUID | None = ...,
+        goal_id: _unique_identifier_msgs_msg_UUID_pb2.UUID | None = ...,
         goal: Move_Goal | None = ...,
     ) -> None: ...
     def HasField(
@@ -85,12 +84,12 @@ class Move_SendGoal_Request(_message.Message):
 class Move_SendGoal_Response(_message.Message):
     accepted: _builtins.bool
     @_builtins.property
-    def stamp(self) -> rosidl_proto.builtin_interfaces.msg.Time_pb2.Time: ...
+    def stamp(self) -> _builtin_interfaces_msg_Time_pb2.Time: ...
     def __init__(
         self,
         *,
         accepted: _builtins.bool | None = ...,
-        stamp: rosidl_proto.builtin_interfaces.msg.Time_pb2.Time | None = ...,
+        stamp: _builtin_interfaces_msg_Time_pb2.Time | None = ...,
     ) -> None: ...
     def HasField(
         self,
@@ -107,11 +106,11 @@ class Move_SendGoal_Response(_message.Message):
 @_typing.final
 class Move_GetResult_Request(_message.Message):
     @_builtins.property
-    def goal_id(self) -> rosidl_proto.unique_identifier_msgs.msg.UUID_pb2.UUID: ...
+    def goal_id(self) -> _unique_identifier_msgs_msg_UUID_pb2.UUID: ...
     def __init__(
         self,
         *,
-        goal_id: rosidl_proto.unique_identifier_msgs.msg.UUID_pb2.UUID | None = ...,
+        goal_id: _unique_identifier_msgs_msg_UUID_pb2.UUID | None = ...,
     ) -> None: ...
     def HasField(
         self,
@@ -151,13 +150,13 @@ class Move_GetResult_Response(_message.Message):
 @_typing.final
 class Move_FeedbackMessage(_message.Message):
     @_builtins.property
-    def goal_id(self) -> rosidl_proto.unique_identifier_msgs.msg.UUID_pb2.UUID: ...
+    def goal_id(self) -> _unique_identifier_msgs_msg_UUID_pb2.UUID: ...
     @_builtins.property
     def feedback(self) -> Move_Feedback: ...
     def __init__(
         self,
         *,
-        goal_id: rosidl_proto.unique_identifier_msgs.msg.UUID_pb2.UUID | None = ...,
+        goal_id: _unique_identifier_msgs_msg_UUID_pb2.UUID | None = ...,
         feedback: Move_Feedback | None = ...,
     ) -> None: ...
     def HasField(

@@ -27,6 +27,7 @@ from rosidl_adapter_proto.adapter import (
     ros_messages,
     ros_octet,
     ros_wide,
+    sequence,
     string,
     text,
     wide,
@@ -167,9 +168,11 @@ class SampleAdapter(adapter.TypeAdapter[Sample, typing.Any]):
                 packed(103608496, numbers(exactly(source.position, 3), "d"))
             )
             field = "switches"
-            message.switches.extend(each(boolean, exactly(source.switches, 2)))
+            message.switches.extend(
+                each(boolean, sequence(exactly(source.switches, 2)))
+            )
             field = "names"
-            message.names.extend(each(string, source.names))
+            message.names.extend(each(string, sequence(source.names)))
             field = "best"
             ItemAdapter.fill_custom(source.best, message.best)
             field = "pair"

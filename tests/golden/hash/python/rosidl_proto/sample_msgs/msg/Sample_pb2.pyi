@@ -7,8 +7,8 @@ from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from google.protobuf.internal import containers as _containers
 
-import rosidl_proto.sample_msgs.msg.Item_pb2
-import rosidl_proto.std_msgs.msg.Header_pb2
+import rosidl_proto.sample_msgs.msg.Item_pb2 as _sample_msgs_msg_Item_pb2
+import rosidl_proto.std_msgs.msg.Header_pb2 as _std_msgs_msg_Header_pb2
 
 DESCRIPTOR: _descriptor.FileDescriptor
 
@@ -55,7 +55,7 @@ class Sample(_message.Message):
     Values from 0 to 255.
     """
     @_builtins.property
-    def header(self) -> rosidl_proto.std_msgs.msg.Header_pb2.Header: ...
+    def header(self) -> _std_msgs_msg_Header_pb2.Header: ...
     @_builtins.property
     def offsets(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
         """
@@ -82,13 +82,11 @@ class Sample(_message.Message):
         """
 
     @_builtins.property
-    def best(self) -> rosidl_proto.sample_msgs.msg.Item_pb2.Item: ...
+    def best(self) -> _sample_msgs_msg_Item_pb2.Item: ...
     @_builtins.property
     def pair(
         self,
-    ) -> _containers.RepeatedCompositeFieldContainer[
-        rosidl_proto.sample_msgs.msg.Item_pb2.Item
-    ]:
+    ) -> _containers.RepeatedCompositeFieldContainer[_sample_msgs_msg_Item_pb2.Item]:
         """
         Exactly 2 elements.
         """
@@ -97,12 +95,12 @@ class Sample(_message.Message):
     def items(
         self,
     ) -> _containers.RepeatedCompositeFieldContainer[
-        rosidl_proto.sample_msgs.msg.Item_pb2.Item
+        _sample_msgs_msg_Item_pb2.Item
     ]: ...
     def __init__(
         self,
         *,
-        header: rosidl_proto.std_msgs.msg.Header_pb2.Header | None = ...,
+        header: _std_msgs_msg_Header_pb2.Header | None = ...,
         ready: _builtins.bool | None = ...,
         flags: _builtins.int | None = ...,
         level: _builtins.int | None = ...,
@@ -115,11 +113,9 @@ class Sample(_message.Message):
         position: _typing.Iterable[_builtins.float] | None = ...,
         switches: _typing.Iterable[_builtins.bool] | None = ...,
         names: _typing.Iterable[_builtins.str] | None = ...,
-        best: rosidl_proto.sample_msgs.msg.Item_pb2.Item | None = ...,
-        pair: _typing.Iterable[rosidl_proto.sample_msgs.msg.Item_pb2.Item] | None = ...,
-        items: (
-            _typing.Iterable[rosidl_proto.sample_msgs.msg.Item_pb2.Item] | None
-        ) = ...,
+        best: _sample_msgs_msg_Item_pb2.Item | None = ...,
+        pair: _typing.Iterable[_sample_msgs_msg_Item_pb2.Item] | None = ...,
+        items: _typing.Iterable[_sample_msgs_msg_Item_pb2.Item] | None = ...,
     ) -> None: ...
     def HasField(
         self,
