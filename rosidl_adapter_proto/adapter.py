@@ -81,10 +81,16 @@ class _Transcoder:
 
         descriptor, message_class = owner.custom_type.DESCRIPTOR, owner.custom_type
         owner.transcoder = Transcoder(owner.type_description(), descriptor, message_class=message_class)
-        # From now on these are the native methods themselves.
-        owner.to_cdr = owner.transcoder.message_to_cdr  # type: ignore[assignment, method-assign]
-        owner.from_cdr = owner.transcoder.cdr_to_message  # type: ignore[method-assign]
+        # From now on these are the native methods themselves, unless somebody has put others in their place.
+        native = {"to_cdr": owner.transcoder.message_to_cdr, "from_cdr": owner.transcoder.cdr_to_message}
+        for name, method in native.items():
+            _native_types.add(type(method))
+            if vars(owner).get(name) is vars(TypeAdapter)[name]:
+                setattr(owner, name, method)
         return owner.transcoder
+
+
+_native_types: set[type] = set()
 
 
 class FieldInfo(NamedTuple):
@@ -138,8 +144,12 @@ class TypeAdapter(Generic[CustomT, RosT]):
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Let a class that derives from an adapter in use have a transcoder of its own."""
         super().__init_subclass__(**arguments)
-        for name in ("transcoder", "to_cdr", "from_cdr"):
-            if name not in vars(cls):
+        for name in ("transcoder", "ros_message_type", "to_cdr", "from_cdr"):
+            if name in vars(cls) or (name == "ros_message_type" and "ros_class" not in vars(cls)):
+                continue
+            inherited = next(vars(base)[name] for base in cls.__mro__[1:] if name in vars(base))
+            is_method = name in ("to_cdr", "from_cdr")
+            if not is_method or inherited is vars(TypeAdapter)[name] or type(inherited) in _native_types:
                 setattr(cls, name, vars(TypeAdapter)[name])
 
     @staticmethod
@@ -416,6 +426,13 @@ def sequence(values: Iterable[Any]) -> Iterable[Any]:
 
 
 _NO_SEQUENCES = (str, bytes, bytearray, memoryview, set, frozenset, Mapping)
+
+
+def ros_string(value: str) -> str:
+    """Return a string that ROS can hold: NUL ends a string there."""
+    if "\0" in value:
+        raise ValueError(f"a string of ROS cannot hold NUL, as at character {value.index(chr(0))}")
+    return value
 
 
 def string(value: object) -> str:

@@ -302,14 +302,14 @@ NB_MODULE(_core, module) {
   nb::class_<Transcoder>(module, "Transcoder")
       .def(nb::init<nb::bytes, std::string, uint64_t, nb::object>(), nb::arg("plan"), nb::arg("type_name"),
            nb::arg("size_limit"), nb::arg("message_class") = nb::none())
-      .def("message_to_cdr", &Transcoder::message_to_cdr, nb::arg("message"),
+      .def("message_to_cdr", &Transcoder::message_to_cdr, nb::arg("source").none(),
            "Turn a protobuf message into a serialized ROS message.")
-      .def("cdr_to_message", &Transcoder::cdr_to_message, nb::arg("data"),
+      .def("cdr_to_message", &Transcoder::cdr_to_message, nb::arg("data").none(),
            "Turn a serialized ROS message into a protobuf message.")
       .def_prop_ro("type_name", &Transcoder::type_name, "The ROS type, such as `sensor_msgs/msg/Imu`.")
-      .def("cdr_to_proto", &Transcoder::transcode<CdrToProto>, nb::arg("data"),
+      .def("cdr_to_proto", &Transcoder::transcode<CdrToProto>, nb::arg("data").none(),
            "Turn a serialized ROS message into a serialized protobuf message.")
-      .def("proto_to_cdr", &Transcoder::transcode<ProtoToCdr>, nb::arg("data"),
+      .def("proto_to_cdr", &Transcoder::transcode<ProtoToCdr>, nb::arg("data").none(),
            "Turn a serialized protobuf message into a serialized ROS message.")
       .def("cdr_to_proto_batch", &Transcoder::transcode_batch<CdrToProto>, nb::arg("messages"),
            nb::arg("threads") = 1, "Do `cdr_to_proto` for each message, on a number of threads.")

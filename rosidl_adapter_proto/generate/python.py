@@ -551,7 +551,7 @@ def _each(convert: str, values: str) -> str:
 def _scalar(element: BasicType | StringType) -> tuple[str, str]:
     """Return how one value is converted, to protobuf and to ROS, with `{}` for the value."""
     if isinstance(element, StringType):
-        to_custom, to_ros = ("wide({})", "ros_wide({})") if element.wide else ("string({})", "{}")
+        to_custom, to_ros = ("wide({})", "ros_wide({})") if element.wide else ("string({})", "ros_string({})")
         if element.bound is None:
             return to_custom, to_ros
         return to_custom.format(f"text({{}}, {element.bound})"), f"text({to_ros}, {element.bound})"

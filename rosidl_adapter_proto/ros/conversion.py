@@ -45,29 +45,9 @@ def deserialize(adapter: type[TypeAdapter[CustomT, Any]], data: bytes) -> Custom
         message: Any = deserialize_message(data, adapter.ros_message_type)
     except Exception as error:  # rclpy raises errors of several kinds
         reason = f"{len(data)} bytes are not a serialized message of this type: {error}"
-        raise ConversionError(adapter.type_name, "", reason) from error
+        raise ConversionError(_type_name(adapter), "", reason) from error
     custom: CustomT = adapter.convert_to_custom(message)
     return custom
-
-
-def takes_ros_messages(adapter: type[TypeAdapter[Any, Any]]) -> bool:
-    """Return whether a subscription should take ROS messages, instead of serialized ones for the transcoder.
-
-    rclpy copies serialized messages more often than others. For an image that costs more than all else, and the bytes
-    of a ROS message are converted by a single copy.
-    """
-    return _is_generated(adapter) and _has_bytes(adapter)  # type: ignore[arg-type]
-
-
-# Unbounded sequences of uint8, int8 and octets in type_description_interfaces/msg/FieldType.
-_BYTES = (147, 146, 160)
-
-
-def _has_bytes(adapter: Any) -> bool:
-    return any(
-        info.type_id in _BYTES or (info.nested is not None and _has_bytes(info.nested))
-        for info in adapter.fields
-    )
 
 
 @cache
@@ -102,12 +82,17 @@ def to_ros_message(adapter: type[TypeAdapter[Any, Any]], message: Any, what: str
     raise wrong_type(adapter, message, what)
 
 
+def _type_name(adapter: Any) -> str:
+    """Return the ROS name of what an adapter converts; one that was written by hand may not say it."""
+    return getattr(adapter, "type_name", None) or str(adapter.__qualname__)
+
+
 def wrong_type(adapter: type[TypeAdapter[Any, Any]], message: object, what: str) -> TypeError:
     """Return the error for something that is no message of the adapter."""
     expected, found = adapter.custom_type, type(message)
     return TypeError(
         f"{what} takes a protobuf message {expected.__module__}.{expected.__qualname__} "
-        f"(or a ROS message {adapter.type_name}), not {found.__module__}.{found.__qualname__}"
+        f"(or a ROS message {_type_name(adapter)}), not {found.__module__}.{found.__qualname__}"
     )
 
 

@@ -67,9 +67,8 @@ class LifecyclePublisher(rclpy.lifecycle.LifecyclePublisher, Publisher[CustomT])
 class Subscription(rclpy.subscription.Subscription, Generic[CustomT]):
     """A subscription to protobuf messages.
 
-    The executor hands `callback` serialized messages (`raw` is true), or ROS messages if the type holds sequences of
-    bytes, as images do. They are converted for the user's callback: `callback.__wrapped__`. Called with a protobuf
-    message, it passes that on, and so a callback can be tried by hand.
+    The executor hands `callback` serialized messages (so `raw` is true), which it converts for the user's callback:
+    `callback.__wrapped__`. Called with a protobuf message, it passes that on, and so a callback can be tried by hand.
 
     Attributes:
         adapter: Converts the messages.

@@ -27,7 +27,6 @@ from rosidl_adapter_proto.ros.conversion import (
     combined,
     convert_in,
     deserialize,
-    takes_ros_messages,
 )
 from rosidl_adapter_proto.ros.entities import (
     Client,
@@ -261,9 +260,8 @@ class NodeMixin:
             callback: Is called with a message, and with its MessageInfo if it takes two arguments.
             qos_profile: The quality of service, or the depth of the history.
             raw: Whether the callback gets serialized messages as they are.
-            on_conversion_error: Is called for a message that cannot be converted, with the ConversionError and what
-                arrived: the serialized message, or a ROS message if the type holds sequences of bytes. Without it an
-                error is logged, at most every five seconds. The message is dropped.
+            on_conversion_error: Is called for a message that cannot be converted, with the ConversionError and the
+                serialized message. Without it an error is logged, at most every five seconds. The message is dropped.
             options: As of `rclpy.node.Node.create_subscription`.
 
         Returns:
@@ -288,15 +286,10 @@ class NodeMixin:
             others = publishers_of_other_versions(node, topic, adapter.type_hash)
             return f"; publishers with another version of the type: {', '.join(others)}" if others else ""
 
-        serialized = not takes_ros_messages(adapter)
-        convert = partial(deserialize, adapter) if serialized else adapter.convert_to_custom
-        received_type = bytes if serialized else ros_type
         reception: Reception[Any] = Reception(
-            node, f"topic {topic}", convert, on_conversion_error, explain, received_type
+            node, f"topic {topic}", partial(deserialize, adapter), on_conversion_error, explain, bytes
         )
-        subscription = create(
-            ros_type, topic, reception.callback(callback), qos_profile, raw=serialized, **options
-        )
+        subscription = create(ros_type, topic, reception.callback(callback), qos_profile, raw=True, **options)
         convert_in(subscription, Subscription, adapter=adapter, _reception=reception)
         return subscription
 

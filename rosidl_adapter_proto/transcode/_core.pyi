@@ -28,7 +28,7 @@ class Transcoder:
     def type_name(self) -> str:
         """The ROS type, such as `sensor_msgs/msg/Imu`."""
 
-    def message_to_cdr(self, message: Message) -> bytes:
+    def message_to_cdr(self, source: Message) -> bytes:
         """Turn a protobuf message into a serialized ROS message."""
 
     def cdr_to_message(self, data: Buffer) -> Any:

@@ -59,7 +59,10 @@ class Move_GoalAdapter(adapter.TypeAdapter[Move_Goal, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_Goal, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_Goal,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_Goal", ""
         try:
             field = "distance"
@@ -68,7 +71,10 @@ class Move_GoalAdapter(adapter.TypeAdapter[Move_Goal, typing.Any]):
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_Goal) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_Goal,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_Goal", ""
         try:
@@ -109,11 +115,17 @@ class Move_ResultAdapter(adapter.TypeAdapter[Move_Result, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_Result, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_Result,
+        message: typing.Any,
+    ) -> None:
         pass  # nothing to convert
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_Result) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_Result,
+    ) -> None:
         message.SetInParent()
 
 
@@ -148,7 +160,10 @@ class Move_FeedbackAdapter(adapter.TypeAdapter[Move_Feedback, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_Feedback, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_Feedback,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_Feedback", ""
         try:
             field = "remaining"
@@ -157,7 +172,10 @@ class Move_FeedbackAdapter(adapter.TypeAdapter[Move_Feedback, typing.Any]):
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_Feedback) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_Feedback,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_Feedback", ""
         try:
@@ -203,7 +221,10 @@ class Move_SendGoal_RequestAdapter(
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_SendGoal_Request, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_SendGoal_Request,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_SendGoal_Request", ""
         try:
             field = "goal_id"
@@ -214,7 +235,10 @@ class Move_SendGoal_RequestAdapter(
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_SendGoal_Request) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_SendGoal_Request,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_SendGoal_Request", ""
         try:
@@ -262,7 +286,10 @@ class Move_SendGoal_ResponseAdapter(
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_SendGoal_Response, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_SendGoal_Response,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_SendGoal_Response", ""
         try:
             field = "accepted"
@@ -273,7 +300,10 @@ class Move_SendGoal_ResponseAdapter(
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_SendGoal_Response) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_SendGoal_Response,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_SendGoal_Response", ""
         try:
@@ -318,7 +348,10 @@ class Move_GetResult_RequestAdapter(
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_GetResult_Request, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_GetResult_Request,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_GetResult_Request", ""
         try:
             field = "goal_id"
@@ -327,7 +360,10 @@ class Move_GetResult_RequestAdapter(
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_GetResult_Request) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_GetResult_Request,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_GetResult_Request", ""
         try:
@@ -373,7 +409,10 @@ class Move_GetResult_ResponseAdapter(
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_GetResult_Response, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_GetResult_Response,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_GetResult_Response", ""
         try:
             field = "status"
@@ -384,7 +423,10 @@ class Move_GetResult_ResponseAdapter(
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_GetResult_Response) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_GetResult_Response,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_GetResult_Response", ""
         try:
@@ -432,7 +474,10 @@ class Move_FeedbackMessageAdapter(
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Move_FeedbackMessage, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Move_FeedbackMessage,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/action/Move_FeedbackMessage", ""
         try:
             field = "goal_id"
@@ -443,7 +488,10 @@ class Move_FeedbackMessageAdapter(
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Move_FeedbackMessage) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Move_FeedbackMessage,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/action/Move_FeedbackMessage", ""
         try:

@@ -62,7 +62,10 @@ class ItemAdapter(adapter.TypeAdapter[Item, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Item, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Item,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/msg/Item", ""
         try:
             field = "weight"
@@ -79,7 +82,10 @@ class ItemAdapter(adapter.TypeAdapter[Item, typing.Any]):
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Item) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Item,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/msg/Item", ""
         try:

@@ -26,6 +26,7 @@ from rosidl_adapter_proto.adapter import (
     ros_message_array,
     ros_messages,
     ros_octet,
+    ros_string,
     ros_wide,
     sequence,
     string,
@@ -97,7 +98,10 @@ class SampleAdapter(adapter.TypeAdapter[Sample, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Sample, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Sample,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/msg/Sample", ""
         try:
             field = "header"
@@ -113,7 +117,7 @@ class SampleAdapter(adapter.TypeAdapter[Sample, typing.Any]):
             field = "count"
             message.count = source.count
             field = "label"
-            message.label = text(source.label, 16)
+            message.label = text(ros_string(source.label), 16)
             field = "title"
             message.title = ros_wide(source.title)
             field = "data"
@@ -128,7 +132,7 @@ class SampleAdapter(adapter.TypeAdapter[Sample, typing.Any]):
                 list(absent_or_exactly(source.switches, 2)) or [False] * 2
             )
             field = "names"
-            message.names = list(source.names)
+            message.names = each(ros_string, source.names)
             field = "best"
             ItemAdapter.fill_ros_message(source.best, message.best)
             field = "pair"
@@ -139,7 +143,10 @@ class SampleAdapter(adapter.TypeAdapter[Sample, typing.Any]):
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Sample) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Sample,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/msg/Sample", ""
         try:

@@ -53,7 +53,10 @@ class Reset_RequestAdapter(adapter.TypeAdapter[Reset_Request, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Reset_Request, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Reset_Request,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/srv/Reset_Request", ""
         try:
             field = "delay"
@@ -62,7 +65,10 @@ class Reset_RequestAdapter(adapter.TypeAdapter[Reset_Request, typing.Any]):
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Reset_Request) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Reset_Request,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/srv/Reset_Request", ""
         try:
@@ -106,7 +112,10 @@ class Reset_ResponseAdapter(adapter.TypeAdapter[Reset_Response, typing.Any]):
         return finish_custom(message, destination)
 
     @staticmethod
-    def fill_ros_message(source: Reset_Response, message: typing.Any) -> None:
+    def fill_ros_message(
+        source: Reset_Response,
+        message: typing.Any,
+    ) -> None:
         type_name, field = "sample_msgs/srv/Reset_Response", ""
         try:
             field = "accepted"
@@ -115,7 +124,10 @@ class Reset_ResponseAdapter(adapter.TypeAdapter[Reset_Response, typing.Any]):
             raise conversion_error(type_name, field, error) from None
 
     @staticmethod
-    def fill_custom(source: typing.Any, message: Reset_Response) -> None:
+    def fill_custom(
+        source: typing.Any,
+        message: Reset_Response,
+    ) -> None:
         message.SetInParent()
         type_name, field = "sample_msgs/srv/Reset_Response", ""
         try:
