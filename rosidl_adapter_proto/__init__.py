@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         DefinitionError,
         Error,
         GenerateError,
+        RequestError,
         SchemaError,
     )
     from rosidl_adapter_proto.schema.numbering import compute_proto_field_number
@@ -36,6 +37,7 @@ __all__ = [
     "DefinitionError",
     "Error",
     "GenerateError",
+    "RequestError",
     "SchemaError",
     "compute_proto_field_number",
 ]

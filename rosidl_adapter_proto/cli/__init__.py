@@ -18,8 +18,9 @@ from rosidl_adapter_proto.cli.configuration import ConfiguredGroup
 from rosidl_adapter_proto.cli.generate import generate_command
 from rosidl_adapter_proto.cli.list import list_command
 from rosidl_adapter_proto.cli.show import show_command
-from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.errors import Error, RequestError
 
+EXIT_USAGE = 2
 EXIT_FAILED = 3
 EXIT_INTERRUPTED = 130
 
@@ -63,5 +64,5 @@ def main(arguments: list[str] | None = None) -> None:
             click.echo(f"Error: {error}", err=True)
         else:
             click.echo(f"Internal error: {error!r}; --debug shows where it comes from", err=True)
-        sys.exit(EXIT_FAILED)
+        sys.exit(EXIT_USAGE if isinstance(error, RequestError) else EXIT_FAILED)
     sys.exit(status or 0)

@@ -10,8 +10,10 @@ from typing import Any
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_name, find_request, schema_options, source_options
+from rosidl_adapter_proto.cli.options import complete_name, schema_options, source_options
 from rosidl_adapter_proto.generate import Options, Progress, Result, generate
+from rosidl_adapter_proto.generate.configuration import OUTPUT_NAME
+from rosidl_adapter_proto.generate.request import find_request
 
 
 @click.command("generate")
@@ -20,7 +22,7 @@ from rosidl_adapter_proto.generate import Options, Progress, Result, generate
     "--output",
     "-o",
     type=click.Path(path_type=Path),
-    default=Path("generated"),
+    default=Path(OUTPUT_NAME),
     show_default=True,
     help="The folder to write. It holds what the last run made, and nothing older.",
 )

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_name, find_sources, source_options
+from rosidl_adapter_proto.cli.options import complete_name, source_options
+from rosidl_adapter_proto.generate.request import find_sources
 
 
 @click.command("list")

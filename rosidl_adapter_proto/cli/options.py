@@ -1,27 +1,18 @@
-"""What several commands share: how arguments become sources and a request."""
+"""The options that several commands share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from rosidl_adapter_proto.errors import Error
-from rosidl_adapter_proto.generate import Request
+from rosidl_adapter_proto.generate.configuration import NUMBERINGS
+from rosidl_adapter_proto.generate.request import find_sources
 from rosidl_adapter_proto.interfaces import store
-from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import (
-    SUFFIXES,
-    Source,
-    Sources,
-    file_source,
-    folder_source,
-    prefix_sources,
-    store_source,
-)
-from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering, SequentialNumbering
+from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -35,7 +26,7 @@ def complete_name(context: click.Context, parameter: click.Parameter, incomplete
     """Return the packages, or behind a slash the types of one, that begin with what was typed."""
     try:
         sources = find_sources(context.params.get("include") or (), context.params.get("distro"))
-    except (Error, click.UsageError):
+    except Error:
         return []
     package, slash, _ = incomplete.partition("/")
     names = map(str, sources.packages.get(package, ())) if slash else sources.packages
@@ -76,76 +67,8 @@ def schema_options(command: Command) -> Command:
     )(command)
     return click.option(
         "--numbering",
-        type=click.Choice([HashNumbering.name, SequentialNumbering.name]),
+        type=click.Choice(NUMBERINGS),
         default=HashNumbering.name,
         show_default=True,
         help="How fields are numbered: from a hash of their names, or in sequence with a lock file.",
     )(command)
-
-
-def find_sources(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Sources:
-    """Return every source in the order they win: `first`, included folders, ROS installations, the store."""
-    folders = [folder_source(_existing(path)) for path in include]
-    return Sources((*first, *folders, *prefix_sources(), store_source(distro)))
-
-
-def find_request(
-    what: Sequence[str], include: Iterable[Path], distro: str | None, dependencies: bool
-) -> tuple[Request, Sources]:
-    """Return what the arguments of a command ask for, and where definitions come from.
-
-    Args:
-        what: Packages, types, folders and files.
-        include: Folders to find definitions in.
-        distro: The distribution of the embedded store.
-        dependencies: Whether dependencies are asked for as well.
-    """
-    given: list[Source] = []
-    packages: list[str] = []
-    types: list[TypeName] = []
-    names: list[str] = []
-    for text in what:
-        path = Path(text)
-        if path.suffix in SUFFIXES:
-            source, name = file_source(_existing(path))
-            _add_file(given, source, name)
-            types.append(name)
-        elif is_path(text):
-            source = folder_source(_existing(path))
-            given.append(source)
-            packages += source.packages
-        else:
-            names.append(text)
-    sources = find_sources(include, distro, given)
-    for text in names:
-        if text not in sources.packages and Path(text).is_dir():
-            source = folder_source(Path(text))
-            sources = Sources((source, *sources.sources))
-            packages += source.packages
-        elif "/" in text:
-            types.append(sources.full_name(text))
-        else:
-            sources.package(text)
-            packages.append(text)
-    return Request(tuple(packages), tuple(types), dependencies), sources
-
-
-def is_path(text: str) -> bool:
-    """Tell whether an argument can only be a file or folder; `std_msgs` may be a folder or a package."""
-    return text.startswith((".", "/")) or text.endswith(("/", *SUFFIXES)) or "\\" in text
-
-
-def _add_file(given: list[Source], source: Source, name: TypeName) -> None:
-    """Add the definition of a file that was named to the source that has its package already, or else its source."""
-    for index, other in enumerate(given):
-        if name.package in other.packages:
-            package = {**other.packages[name.package], name: source.packages[name.package][name]}
-            given[index] = Source(other.origin, {**other.packages, name.package: package})
-            return
-    given.append(source)
-
-
-def _existing(path: Path) -> Path:
-    if not path.exists():
-        raise click.UsageError(f"there is no file or folder {path}")
-    return path

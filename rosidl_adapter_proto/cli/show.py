@@ -7,8 +7,9 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_name, find_sources, schema_options, source_options
+from rosidl_adapter_proto.cli.options import complete_name, schema_options, source_options
 from rosidl_adapter_proto.generate import Options, proto_text
+from rosidl_adapter_proto.generate.request import find_sources
 
 
 @click.command("show")

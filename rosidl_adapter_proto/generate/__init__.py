@@ -22,50 +22,20 @@ from rosidl_adapter_proto.generate.layout import (
     write,
 )
 from rosidl_adapter_proto.generate.manifest import digest, is_intact, read_manifest
+from rosidl_adapter_proto.generate.request import Options, Request
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.sources import Sources, closure
 from rosidl_adapter_proto.schema.numbering import (
-    LOCK_FILE_NAME,
     HashNumbering,
     Numbering,
     SequentialNumbering,
 )
 from rosidl_adapter_proto.schema.proto import check_names, proto_file
 
+__all__ = ("Options", "Progress", "Request", "Result", "generate", "proto_text")
+
 Progress = Callable[[int, int], None]
 """Is told how many interfaces are done, and how many there are."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to generate.
-
-    Attributes:
-        packages: Packages, which are generated whole.
-        types: Single interfaces.
-        dependencies: Whether to generate what these refer to as well.
-    """
-
-    packages: tuple[str, ...] = ()
-    types: tuple[TypeName, ...] = ()
-    dependencies: bool = True
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to generate.
-
-    Attributes:
-        numbering: How fields are numbered: `hash` or `sequential`.
-        lock_file: Where sequential numbers are kept.
-        events: Whether services get their `_Event` messages.
-        python_root: The namespace package that the generated packages are in.
-    """
-
-    numbering: str = "hash"
-    lock_file: Path = Path(LOCK_FILE_NAME)
-    events: bool = False
-    python_root: str = "rosidl_proto"
 
 
 @dataclass(frozen=True)

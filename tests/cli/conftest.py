@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,14 +25,8 @@ Run = Callable[..., Outcome]
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder; definitions are found in it and in the embedded store alone."""
-    monkeypatch.setattr(sys, "prefix", str(tmp_path / "no ROS here"))
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    monkeypatch.delenv("ROS_DISTRO", raising=False)
-    (tmp_path / "work").mkdir()
-    monkeypatch.chdir(tmp_path / "work")
-    return tmp_path / "work"
+def in_folder(folder: Path) -> None:
+    """Every command runs in an empty folder."""
 
 
 @pytest.fixture

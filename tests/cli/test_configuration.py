@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import click
 import pytest
 
+from rosidl_adapter_proto.cli.generate import generate_command
+from rosidl_adapter_proto.generate.configuration import SETTINGS as SETTINGS_BY_NAME
 from tests.cli.conftest import Run
 from tests.folders import content, write_package
 
@@ -191,6 +194,48 @@ def test_a_file_that_cannot_be_read(folder: Path, run: Run) -> None:
     assert run("completion", "bash").code == 2
 
 
+def test_setup_cfg(folder: Path, run: Run) -> None:
+    """It says the same in its own way: lists have an entry a line, or commas; a pyproject.toml with settings wins."""
+    (folder / "setup.cfg").write_text(
+        "[metadata]\nname = mine\n\n[tool.rosidl-proto]\n"
+        "packages =\n  ./src/my_msgs\n  builtin_interfaces/msg/Time, src/two_msgs/msg/T.msg\n"
+        "output = out\ndeps = no\nevents = true\npython-root = my_protos\n"
+    )
+    configure(folder, "[project]\nname = 'mine'\n")
+
+    assert run("generate").code == 0
+
+    protos = {path: data for path, data in content(folder / "out" / "proto").items() if data}
+    assert set(protos) == {
+        "my_msgs/msg/A.proto",
+        "builtin_interfaces/msg/Time.proto",
+        "two_msgs/msg/T.proto",
+    }
+    assert [path.name for path in (folder / "out" / "python").iterdir()] == ["my_protos"]
+    configure(folder, '[tool.rosidl-proto]\npackages = ["more_msgs"]\ninclude = ["src/more", "src"]\n')
+    assert run("generate").code == 0
+    assert (folder / "generated" / "proto" / "more_msgs").is_dir()
+
+
+def test_a_wrong_setup_cfg(folder: Path, run: Run) -> None:
+    file = folder / "setup.cfg"
+    file.write_text("[tool.rosidl-proto]\ndeps = maybe\n")
+    assert run("list").err == f"Error: {file}: [tool.rosidl-proto] deps must be true or false\n"
+    file.write_text("[tool.rosidl-proto\n")
+    ended = run("list")
+    assert (ended.code, ended.out) == (2, "")
+    assert ended.err.startswith(f"Error: cannot read {file}: File contains no section headers.")
+
+
+def test_the_settings_are_the_options_of_the_commands() -> None:
+    names = {
+        "packages" if isinstance(parameter, click.Argument) else parameter.opts[0].removeprefix("--")
+        for parameter in generate_command.params
+    }
+
+    assert names - {"check", "verbose"} == set(SETTINGS_BY_NAME)
+
+
 @pytest.mark.parametrize("text", ["", "tool = 1", "[tool]\nother = 1", "[tool.rosidl-proto]"])
 def test_a_file_without_settings(text: str, folder: Path, run: Run) -> None:
     configure(folder, text)
@@ -205,4 +250,4 @@ def test_a_wrong_package(folder: Path, run: Run) -> None:
     ended = run("generate")
 
     assert ended.code == 2
-    assert ended.err.endswith("\nError: there is no file or folder nowhere\n")
+    assert ended.err == "Error: there is no file or folder nowhere\n"

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import click
 import pytest
 
-from rosidl_adapter_proto.cli.options import find_request, is_path
-from rosidl_adapter_proto.errors import DefinitionError
+from rosidl_adapter_proto.errors import DefinitionError, RequestError
+from rosidl_adapter_proto.generate.request import find_request, is_path
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.sources import closure
 from tests.folders import write_package
@@ -106,9 +105,9 @@ def test_the_distribution_of_the_store(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("what", "include", "distro", "error", "message"),
     [
-        ("./nowhere", "", None, click.UsageError, "there is no file or folder nowhere"),
-        ("nowhere.msg", "", None, click.UsageError, "there is no file or folder nowhere.msg"),
-        ("std_msgs", "nowhere", None, click.UsageError, "there is no file or folder nowhere"),
+        ("./nowhere", "", None, RequestError, "there is no file or folder nowhere"),
+        ("nowhere.msg", "", None, RequestError, "there is no file or folder nowhere.msg"),
+        ("std_msgs", "nowhere", None, RequestError, "there is no file or folder nowhere"),
         (
             "std_msg",
             "",
