@@ -17,6 +17,7 @@ FLOORS = {
     "generate": 5,
     "ros": 5,
     "cli": 7,
+    "hooks": 7,
     "errors": 0,
 }
 ENTRANCES = ("__init__", "__main__")

@@ -16,6 +16,7 @@ import click
 from rosidl_adapter_proto.cli.completion import completion_command
 from rosidl_adapter_proto.cli.configuration import ConfiguredGroup
 from rosidl_adapter_proto.cli.generate import generate_command
+from rosidl_adapter_proto.cli.hook import cmake_dir_command, hook_group
 from rosidl_adapter_proto.cli.list import list_command
 from rosidl_adapter_proto.cli.show import show_command
 from rosidl_adapter_proto.errors import Error, RequestError
@@ -36,7 +37,14 @@ def program(debug: bool) -> None:
     """
 
 
-for command in (generate_command, list_command, show_command, completion_command):
+for command in (
+    generate_command,
+    list_command,
+    show_command,
+    hook_group,
+    cmake_dir_command,
+    completion_command,
+):
     program.add_command(command)
 
 

@@ -7,20 +7,29 @@ from pathlib import Path
 import click
 
 from rosidl_adapter_proto.cli.options import complete_name, source_options
+from rosidl_adapter_proto.generate.index import installed_packages
 from rosidl_adapter_proto.generate.request import find_sources
+from rosidl_adapter_proto.interfaces.sources import prefixes
 
 
 @click.command("list")
 @click.argument("package", required=False, shell_complete=complete_name)
 @source_options
 def list_command(package: str | None, include: tuple[Path, ...], distro: str | None) -> None:
-    """List the packages that are found and where, or the interfaces of one PACKAGE."""
+    """List the packages that are found and where, or the interfaces of one PACKAGE.
+
+    A package whose protobuf types and adapters are installed is listed with their place, too.
+    """
     sources = find_sources(include, distro)
     if package is None:
-        rows = [
-            (name, str(len(found)), next(iter(found.values())).origin)
-            for name, found in sorted(sources.packages.items())
-        ]
+        installed = installed_packages(prefixes())
+        rows = []
+        for name in sorted({*sources.packages, *installed}):
+            found = sources.packages.get(name, {})
+            places = [next(iter(found.values())).origin if found else "no definitions"]
+            if name in installed:
+                places.append(f"adapters in {installed[name].prefix}")
+            rows.append((name, str(len(found)), ", ".join(places)))
     else:
         rows = [
             (str(name), definition.format, definition.file)

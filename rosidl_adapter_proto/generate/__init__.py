@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from rosidl_adapter_proto.errors import GenerateError
+from rosidl_adapter_proto.generate.index import RESOURCE_TYPE, generated_packages
 from rosidl_adapter_proto.generate.layout import (
     Changes,
     alone_in,
@@ -30,9 +31,18 @@ from rosidl_adapter_proto.schema.numbering import (
     Numbering,
     SequentialNumbering,
 )
-from rosidl_adapter_proto.schema.proto import check_names, proto_file
+from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, proto_file
 
-__all__ = ("Options", "Progress", "Request", "Result", "generate", "proto_text")
+__all__ = (
+    "Options",
+    "Progress",
+    "Request",
+    "Result",
+    "check_definitions",
+    "generate",
+    "proto_text",
+    "tool_files",
+)
 
 Progress = Callable[[int, int], None]
 """Is told how many interfaces are done, and how many there are."""
@@ -109,6 +119,21 @@ def generate(
     return Result(tuple(names), changed, new_lock_text != lock_text, _warnings(sources, names))
 
 
+def check_definitions(request: Request, sources: Sources, options: Options = Options()) -> list[TypeName]:
+    """Check all that can be wrong with definitions, and return what the request asks for, dependencies included.
+
+    It is quick, since it stops where protoc and files begin: a build may call it before all else.
+
+    Raises:
+        DefinitionError: A definition is missing or not valid.
+        SchemaError: An interface cannot be mapped to protobuf, or the lock file disagrees.
+        GenerateError: The lock file cannot be read.
+    """
+    names = closure(sources, request.packages, request.types, events=options.events)
+    _proto_files(names, sources, options, _numbering(options, _read_lock(options)))
+    return names
+
+
 def proto_text(name: TypeName, sources: Sources, options: Options = Options()) -> str:
     """Return the `.proto` file of an interface.
 
@@ -139,13 +164,7 @@ def _generate_files(
     from rosidl_adapter_proto.generate.render import render, render_modules, render_packages
 
     _check_python_root(options.python_root)
-    protos = [
-        proto_file(
-            sources.definition(name).interface, numbering, sources.definition_name, events=options.events
-        )
-        for name in names
-    ]
-    check_names(protos)
+    protos = _proto_files(names, sources, options, numbering)
     texts = {file.path: render("proto/interface.proto.jinja", file=file) for file in protos}
     wanted = [file for file in protos if _is_wanted(file.source.name, request)]
     descriptors = compile_protos(texts, [file.path for file in wanted])
@@ -159,7 +178,22 @@ def _generate_files(
             progress(done, len(modules))
     requested = {*request.packages, *(name.package for name in request.types)}
     files.update(render_packages(modules, options.python_root, requested))
+    resources = generated_packages((file.source.name for file in wanted), sources, options)
+    files.update((f"index/{RESOURCE_TYPE}/{name}", each.to_json()) for name, each in resources.items())
     return files
+
+
+def _proto_files(
+    names: Iterable[TypeName], sources: Sources, options: Options, numbering: Numbering
+) -> list[ProtoFile]:
+    protos = [
+        proto_file(
+            sources.definition(name).interface, numbering, sources.definition_name, events=options.events
+        )
+        for name in names
+    ]
+    check_names(protos)
+    return protos
 
 
 def _check_python_root(name: str) -> None:
@@ -240,14 +274,17 @@ _IN_EVERY_SERVICE = (
 """The type hash of a service covers its `_Event`, even where that is not generated."""
 
 
-def _tool_digest() -> str:
-    """Return a digest of this program: what it generates may change with any of its files and libraries."""
+def tool_files() -> list[Path]:
+    """Return the files of this program that decide what is generated."""
     package = Path(__file__).resolve().parent.parent
     folders = [package / name for name in ("interfaces", "schema", "generate", "templates")]
     folders.append(package.parent / "templates")
     files = sorted(file for folder in folders if folder.is_dir() for file in folder.rglob("*.*"))
-    parts = [
-        file.name + digest(file.read_bytes()) for file in files if file.suffix in (".py", ".jinja", ".lark")
-    ]
+    return [file for file in files if file.suffix in (".py", ".jinja", ".lark")]
+
+
+def _tool_digest() -> str:
+    """Return a digest of this program: what it generates may change with any of its files and libraries."""
+    parts = [file.name + digest(file.read_bytes()) for file in tool_files()]
     parts += [version(library) for library in ("black", "grpcio-tools", "jinja2")]
     return digest("".join(parts).encode())

@@ -164,12 +164,41 @@ def file_source(file: Path) -> tuple[Source, TypeName]:
     return Source(str(file), {name: package}), type_name
 
 
+def interface_source(package: str, interfaces: Iterable[str]) -> Source:
+    """Return the source of a package whose definitions are listed, as ROS's build and its command line do.
+
+    Args:
+        package: The name of the package.
+        interfaces: Its definitions: paths such as `msg/Track.msg`, which may follow a base folder and a colon.
+
+    Raises:
+        DefinitionError: One is not in a folder msg, srv or action.
+    """
+    definitions: dict[TypeName, Definition] = {}
+    for interface in interfaces:
+        base, _, relative = interface.rpartition(":")
+        file = Path(base, relative)
+        namespace = Path(relative).parent.name
+        if namespace not in NAMESPACES or file.suffix not in (".idl", f".{namespace}"):
+            raise DefinitionError(
+                f"{file} is not in a folder msg, srv or action, which says what it defines; move it to one"
+            )
+        name = TypeName(package, namespace, file.stem)
+        definitions[name] = Definition(name, file.suffix, str(file), f"package {package}")
+    return Source(f"package {package}", {package: definitions})
+
+
+def prefixes() -> list[Path]:
+    """Return where ROS packages are installed: `AMENT_PREFIX_PATH`, then the environment of this Python."""
+    parts = [part for part in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if part]
+    return [Path(prefix) for prefix in dict.fromkeys(os.path.realpath(part) for part in [*parts, sys.prefix])]
+
+
 def prefix_sources() -> list[Source]:
-    """Return the ROS installations: each prefix on `AMENT_PREFIX_PATH`, then the environment of this Python."""
-    prefixes = [part for part in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if part]
+    """Return the ROS installations, in the order of `prefixes`."""
     sources: list[Source] = []
-    for prefix in dict.fromkeys(os.path.realpath(part) for part in [*prefixes, sys.prefix]):
-        share = Path(prefix, "share")
+    for prefix in prefixes():
+        share = prefix / "share"
         if not share.is_dir():
             continue
         origin = f"ROS prefix {prefix}"

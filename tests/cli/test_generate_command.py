@@ -21,6 +21,7 @@ FILES = [
     "python/rosidl_proto/my_msgs/msg/__init__.py",
     "python/rosidl_proto/my_msgs/msg/py.typed",
     "pyproject.toml",
+    "index/rosidl_proto/my_msgs",
 ]
 
 
@@ -31,11 +32,11 @@ def lines(verb: str, folder: str = "generated") -> str:
 def test_first_and_second_run(my_msgs: Path, folder: Path, run: Run) -> None:
     first = run("generate", "./src")
     assert (first.code, first.err) == (0, "")
-    assert first.out == "generated: 1 interface, files: 7 written, 0 removed, 0 unchanged\n"
+    assert first.out == "generated: 1 interface, files: 8 written, 0 removed, 0 unchanged\n"
     assert all((folder / "generated" / path).is_file() for path in FILES)
 
     again = run("generate", "./src")
-    assert again.out == "generated: 1 interface, files: 0 written, 0 removed, 7 unchanged\n"
+    assert again.out == "generated: 1 interface, files: 0 written, 0 removed, 8 unchanged\n"
 
 
 def test_verbose(my_msgs: Path, run: Run) -> None:
@@ -46,7 +47,7 @@ def test_verbose(my_msgs: Path, run: Run) -> None:
         "my_msgs/msg/A from src/my_msgs/msg/A.msg\n"
         + lines("wrote", "out")
         + "wrote rosidl-proto.lock\n"
-        + "out: 1 interface, files: 7 written, 0 removed, 0 unchanged\n"
+        + "out: 1 interface, files: 8 written, 0 removed, 0 unchanged\n"
     )
 
 

@@ -89,10 +89,10 @@ def test_progress_on_a_terminal(my_msgs: Path) -> None:
     shown = run_on_terminal("generate", "src")
     assert "generating" in shown
     assert "100%" in shown
-    assert shown.endswith("generated: 2 interfaces, files: 11 written, 0 removed, 0 unchanged\r\n")
+    assert shown.endswith("generated: 2 interfaces, files: 12 written, 0 removed, 0 unchanged\r\n")
 
     assert run_on_terminal("generate", "src") == (
-        "generated: 2 interfaces, files: 0 written, 0 removed, 11 unchanged\r\n"
+        "generated: 2 interfaces, files: 0 written, 0 removed, 12 unchanged\r\n"
     )
 
 

@@ -98,12 +98,14 @@ def files_in(output: Path) -> set[str]:
 BASE_FILES = {
     "proto/base_msgs/msg/Other.proto",
     "proto/base_msgs/msg/Point.proto",
+    "index/rosidl_proto/base_msgs",
     *modules("base_msgs/msg", "Other"),
     *modules("base_msgs/msg", "Point"),
 }
 MY_FILES = {
     "proto/my_msgs/msg/Place.proto",
     "proto/my_msgs/srv/Move.proto",
+    "index/rosidl_proto/my_msgs",
     *modules("my_msgs/msg", "Place"),
     *modules("my_msgs/srv", "Move"),
 }
@@ -135,6 +137,7 @@ def test_a_single_type(source: Path, output: Path) -> None:
     run(source, output, (), [TypeName("my_msgs", "msg", "Place")])
 
     assert files_in(output) == BASE_FILES | OWN_FILES | {
+        "index/rosidl_proto/my_msgs",
         "proto/my_msgs/msg/Place.proto",
         *modules("my_msgs/msg", "Place"),
     }
@@ -143,7 +146,11 @@ def test_a_single_type(source: Path, output: Path) -> None:
 def test_a_single_type_without_dependencies(source: Path, output: Path) -> None:
     run(source, output, (), [TypeName("my_msgs", "msg", "Place")], deps=False)
 
-    assert files_in(output) == {"proto/my_msgs/msg/Place.proto"} | modules("my_msgs/msg", "Place") | OWN_FILES
+    assert files_in(output) == OWN_FILES | {
+        "index/rosidl_proto/my_msgs",
+        "proto/my_msgs/msg/Place.proto",
+        *modules("my_msgs/msg", "Place"),
+    }
 
 
 def test_python_root(source: Path, output: Path) -> None:
@@ -214,6 +221,7 @@ def test_a_changed_definition_rewrites_what_depends_on_it(source: Path, generate
 
     base = "python/rosidl_proto/my_msgs/msg/Place"
     expected = {
+        "index/rosidl_proto/my_msgs",
         "proto/my_msgs/msg/Place.proto",
         f"{base}_pb2.py",
         f"{base}_pb2.pyi",
@@ -231,6 +239,7 @@ def test_a_changed_type_changes_the_hash_of_those_that_have_it(source: Path, gen
     result = run(source, generated)
 
     assert {path.rpartition("/")[2] for path in result.changes.written} == {
+        "base_msgs",
         "Point.proto",
         "Point_pb2.py",
         "Point_pb2.pyi",

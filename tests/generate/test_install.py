@@ -63,9 +63,9 @@ def test_pip_install(ignored: bool, tmp_path: Path) -> None:
     assert content(output) == before
     share = {path: data for path, data in content(environment / "share").items() if data is not None}
     assert share == {
-        path.removeprefix("proto/"): data
+        path.removeprefix("proto/").replace("index/", "ament_index/resource_index/"): data
         for path, data in before.items()
-        if path.startswith("proto/") and data is not None
+        if path.startswith(("proto/", "index/")) and data is not None
     }
     (site,) = (environment / "lib").glob("python*/site-packages")
     installed = {path: data for path, data in content(site).items() if path.startswith("rosidl_proto/")}

@@ -1,0 +1,105 @@
+"""The ament index resource `rosidl_proto`: says of which packages protobuf types and adapters are installed.
+
+Every generated package has one, a small JSON file `share/ament_index/resource_index/rosidl_proto/<package>` in the
+prefix that it is installed to. Build hooks look there for what they need not generate again.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rosidl_adapter_proto.errors import GenerateError
+from rosidl_adapter_proto.generate.manifest import digest
+from rosidl_adapter_proto.generate.request import Options
+from rosidl_adapter_proto.interfaces.model import TypeName
+from rosidl_adapter_proto.interfaces.sources import Sources
+
+RESOURCE_TYPE = "rosidl_proto"
+RESOURCE_FOLDER = f"share/ament_index/resource_index/{RESOURCE_TYPE}"
+
+
+@dataclass(frozen=True)
+class GeneratedPackage:
+    """What was generated of a package, and how.
+
+    Attributes:
+        interfaces: The number of its interfaces.
+        definitions: A digest of their definitions.
+        numbering: How fields are numbered: `hash` or `sequential`.
+        events: Whether services have their `_Event` messages.
+        python_root: The namespace package that its Python package is in.
+    """
+
+    interfaces: int
+    definitions: str
+    numbering: str
+    events: bool
+    python_root: str
+
+    def to_json(self) -> bytes:
+        """Return the content of the resource."""
+        return (json.dumps(asdict(self), indent=1) + "\n").encode()
+
+
+@dataclass(frozen=True)
+class InstalledPackage:
+    """A generated package, and the prefix that it is installed to."""
+
+    prefix: Path
+    generated: GeneratedPackage
+
+
+def generated_packages(
+    names: Iterable[TypeName], sources: Sources, options: Options
+) -> dict[str, GeneratedPackage]:
+    """Return what is generated of each package when `names` are."""
+    by_package: dict[str, list[TypeName]] = {}
+    for name in sorted(names):
+        by_package.setdefault(name.package, []).append(name)
+    return {
+        package: GeneratedPackage(
+            len(interfaces),
+            digest(
+                "".join(f"{each}\n{_essence(sources.definition(each).text)}" for each in interfaces).encode()
+            ),
+            options.numbering,
+            options.events,
+            options.python_root,
+        )
+        for package, interfaces in by_package.items()
+    }
+
+
+def _essence(text: str) -> str:
+    """Return a definition without what makes no difference: empty lines, and spaces at the ends of lines."""
+    return "".join(f"{line.rstrip()}\n" for line in text.splitlines() if line.strip())
+
+
+def installed_packages(prefixes: Iterable[Path]) -> Mapping[str, InstalledPackage]:
+    """Return what is installed of each package, and the first prefix that has it.
+
+    Raises:
+        GenerateError: A resource cannot be read.
+    """
+    found: dict[str, InstalledPackage] = {}
+    for prefix in prefixes:
+        try:
+            files = sorted((prefix / RESOURCE_FOLDER).iterdir())
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        for file in files:
+            found.setdefault(file.name, InstalledPackage(prefix, _read(file)))
+    return found
+
+
+def _read(file: Path) -> GeneratedPackage:
+    try:
+        return GeneratedPackage(**json.loads(file.read_bytes()))
+    except (OSError, ValueError, TypeError) as error:
+        raise GenerateError(
+            f"{file} is not a resource that this version of rosidl-proto reads ({error}); "
+            "install its package again, or remove the file"
+        ) from None

@@ -1,0 +1,46 @@
+"""The type `proto` of ROS's own command line: `rosidl generate -t proto`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rosidl_cli.command.generate.extensions import GenerateCommandExtension
+
+from rosidl_adapter_proto.generate import Request, generate
+from rosidl_adapter_proto.generate.manifest import read_manifest
+from rosidl_adapter_proto.generate.request import find_sources
+from rosidl_adapter_proto.interfaces.sources import interface_source
+
+
+class GenerateProto(GenerateCommandExtension):  # type: ignore[misc, unused-ignore]
+    """Generates `.proto` files, protobuf classes and adapters."""
+
+    def generate(
+        self,
+        package_name: str,
+        interface_files: list[str],
+        include_paths: list[str],
+        output_path: Path,
+        type_description_files: list[str] | None = None,
+    ) -> list[str]:
+        """Generate a package, and what it depends on.
+
+        Args:
+            package_name: The package.
+            interface_files: Its definitions; each may have a base folder and a colon before its path.
+            include_paths: Folders of packages to find dependencies in.
+            output_path: The folder to write.
+            type_description_files: Not needed.
+
+        Returns:
+            The generated files.
+
+        Raises:
+            Error: A definition is wrong or missing, or files cannot be written.
+        """
+        own = interface_source(package_name, interface_files)
+        names = tuple(own.packages[package_name])
+        sources = find_sources(map(Path, include_paths), None, [own])
+        generate(Request(types=names), sources, output_path)
+        manifest = read_manifest(output_path)
+        return [str(output_path / path) for path in manifest.outputs] if manifest else []

@@ -1,0 +1,50 @@
+# Runs in rosidl_generate_interfaces(): protobuf types and adapters become part of the package.
+
+if(ROSIDL_PROTO_SKIP)
+  message(STATUS "rosidl_generator_proto: skipped, since ROSIDL_PROTO_SKIP is set")
+  return()
+endif()
+
+_rosidl_generator_proto_arguments(
+  "${CMAKE_CURRENT_BINARY_DIR}/rosidl_generator_proto/${rosidl_generate_interfaces_TARGET}")
+foreach(_package ${rosidl_generate_interfaces_DEPENDENCY_PACKAGE_NAMES})
+  get_filename_component(_share "${${_package}_DIR}/.." ABSOLUTE)
+  list(APPEND _proto_arguments --dependency "${_share}")
+endforeach()
+_rosidl_generator_proto_run(check)
+
+if(POLICY CMP0116)
+  cmake_policy(SET CMP0116 NEW)
+endif()
+add_custom_command(
+  OUTPUT "${_proto_output}/stamp"
+  COMMAND ${_proto_command} generate "@${_proto_arguments_file}"
+  DEPENDS ${_proto_definitions} "${_proto_arguments_file}"
+  DEPFILE "${_proto_output}/depfile"
+  COMMENT "Generating protobuf types and adapters"
+  VERBATIM)
+add_custom_target(
+  ${rosidl_generate_interfaces_TARGET}__rosidl_generator_proto ALL DEPENDS "${_proto_output}/stamp")
+add_dependencies(
+  ${rosidl_generate_interfaces_TARGET} ${rosidl_generate_interfaces_TARGET}__rosidl_generator_proto)
+
+if(NOT rosidl_generate_interfaces_SKIP_INSTALL)
+  _ament_cmake_python_register_environment_hook()
+  ament_get_python_install_dir(_proto_python_install_dir)
+  foreach(_part dependencies package)
+    install(
+      DIRECTORY "${_proto_output}/${_part}/proto/"
+      DESTINATION "share"
+      OPTIONAL)
+    install(
+      DIRECTORY "${_proto_output}/${_part}/python/"
+      DESTINATION "${_proto_python_install_dir}"
+      OPTIONAL
+      PATTERN "__pycache__" EXCLUDE)
+    install(
+      DIRECTORY "${_proto_output}/${_part}/index/"
+      DESTINATION "share/ament_index/resource_index"
+      OPTIONAL)
+  endforeach()
+endif()
+message(STATUS "rosidl_generator_proto: ${PROJECT_NAME} gets protobuf types and adapters")
