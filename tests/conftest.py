@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.programs import run
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add what `make golden` uses."""
@@ -31,3 +33,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "work").mkdir()
     monkeypatch.chdir(tmp_path / "work")
     return tmp_path / "work"
+
+
+@pytest.fixture(scope="session")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this project."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+    root = Path(__file__).parent.parent
+    run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", folder, root, folder=folder)
+    (file,) = folder.glob("*.whl")
+    return file

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import venv
 from pathlib import Path
 
-ROOT = Path(__file__).parent.parent
+from tests.programs import run
+
 USE = """
 from rosidl_proto.std_msgs.msg import Header, HeaderAdapter
 header = HeaderAdapter.new(frame_id="map")
@@ -18,19 +16,7 @@ print(rosidl_adapter_proto.__file__)
 """
 
 
-def run(*command: str | Path, folder: Path, **variables: str) -> str:
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    done = subprocess.run(
-        command, cwd=folder, env={**environment, **variables}, capture_output=True, check=False, text=True
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
-def test_wheel(tmp_path: Path) -> None:
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check")
-    run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT, folder=tmp_path)
-    (wheel,) = tmp_path.glob("*.whl")
+def test_wheel(wheel: Path, tmp_path: Path) -> None:
     venv.create(tmp_path / "venv", with_pip=True, symlinks=True)
     programs = tmp_path / "venv/bin"
     run(programs / "pip", "install", "--quiet", wheel, folder=tmp_path)

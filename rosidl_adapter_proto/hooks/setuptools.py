@@ -26,6 +26,8 @@ def finalize_distribution_options(distribution: Distribution) -> None:
     folder = _project_folder()
     if not any(_mentions_us(folder / name) for name in ("pyproject.toml", "setup.cfg")):
         return
+    # A project may have nothing but what is generated, and setuptools would then not run build_py.
+    distribution.has_pure_modules = lambda: True  # type: ignore[attr-defined, method-assign, unused-ignore]
     for name, extend in (("build_py", _build_py), ("develop", _develop)):
         command: Any = distribution.get_command_class(name)
         if not hasattr(command, "rosidl_proto_project"):

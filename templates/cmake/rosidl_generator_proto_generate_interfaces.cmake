@@ -28,6 +28,27 @@ add_custom_target(
 add_dependencies(
   ${rosidl_generate_interfaces_TARGET} ${rosidl_generate_interfaces_TARGET}__rosidl_generator_proto)
 
+# Type hashes cover messages of other packages too, but ROS does not make them anew when one of those has changed. Our
+# adapters would then be right, and refused for it.
+if(TARGET ${rosidl_generate_interfaces_TARGET}__rosidl_generator_type_description)
+  list(GET rosidl_generate_interfaces_ABS_IDL_FILES 0 _idl_file)
+  get_filename_component(_folder "${_idl_file}" DIRECTORY)
+  get_filename_component(_folder "${_folder}" NAME)
+  get_filename_component(_name "${_idl_file}" NAME_WE)
+  set(_descriptions "")
+  foreach(_package ${rosidl_generate_interfaces_DEPENDENCY_PACKAGE_NAMES})
+    foreach(_idl_file ${${_package}_IDL_FILES})
+      string(REGEX REPLACE "\\.idl$" ".json" _description "${${_package}_DIR}/../${_idl_file}")
+      if(EXISTS "${_description}")
+        list(APPEND _descriptions "${_description}")
+      endif()
+    endforeach()
+  endforeach()
+  add_custom_command(
+    OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/rosidl_generator_type_description/${PROJECT_NAME}/${_folder}/${_name}.json"
+    APPEND DEPENDS ${_descriptions})
+endif()
+
 if(NOT rosidl_generate_interfaces_SKIP_INSTALL)
   _ament_cmake_python_register_environment_hook()
   ament_get_python_install_dir(_proto_python_install_dir)

@@ -167,7 +167,14 @@ def test_help(arguments: list[str], expected: str, run: Run) -> None:
 def test_every_command_is_listed(run: Run) -> None:
     listed = run("--help").out.partition("Commands:\n")[2]
 
-    assert [line.split()[0] for line in listed.splitlines()] == ["completion", "generate", "list", "show"]
+    assert [line.split()[0] for line in listed.splitlines()] == [
+        "cmake-dir",
+        "completion",
+        "generate",
+        "hook",
+        "list",
+        "show",
+    ]
 
 
 @pytest.mark.parametrize(

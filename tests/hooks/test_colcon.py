@@ -1,0 +1,277 @@
+"""Workspaces built by colcon, with ROS from wheels: run by `make test-colcon` in an environment of its own."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from tests.ros.support import reserve_domain
+
+pytestmark = pytest.mark.skipif(find_spec("colcon_core") is None, reason="needs colcon: make test-colcon")
+
+ROOT = Path(__file__).parents[2]
+SECONDS = 120.0
+"""How long anything may take on a busy machine. Nothing waits that long if all is well."""
+NATIVE = "scene_msgs/msg/_scene.py"
+"""Something that ROS itself builds."""
+
+
+def environment(**variables: str) -> dict[str, str]:
+    """Return the variables of a shell in which the environment of this Python is the ROS installation."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PYTEST"))}
+    prefix = {"AMENT_PREFIX_PATH": sys.prefix, "CMAKE_PREFIX_PATH": sys.prefix, "VIRTUAL_ENV": sys.prefix}
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    return {**kept, **prefix, "PATH": path, **variables}
+
+
+class Workspace:
+    """A copy of the workspace of the examples."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        shutil.copytree(ROOT / "examples" / "workspace", folder)
+
+    def file(self, path: str) -> Path:
+        """Return a file of the sources."""
+        return self.folder / "src" / path
+
+    def replace(self, path: str, old: str, new: str) -> None:
+        """Change a file of the sources."""
+        text = self.file(path).read_text(encoding="utf-8")
+        assert old in text
+        self.file(path).write_text(text.replace(old, new), encoding="utf-8")
+
+    def build(self, *options: str, succeeds: bool = True) -> str:
+        """Build, and return what is printed."""
+        command = ["colcon", "build", "--executor", "sequential", *options]
+        process = subprocess.run(
+            [*command, "--event-handlers", "console_direct+"],
+            cwd=self.folder,
+            env=environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            check=False,
+            text=True,
+        )
+        assert (process.returncode == 0) == succeeds, process.stdout[-10_000:]
+        return process.stdout
+
+    def run(self, script: str) -> str:
+        """Run a shell script where the workspace is sourced, and return what it prints."""
+        process = subprocess.run(
+            ["bash", "-ec", f"source install/setup.bash\n{script}"],
+            cwd=self.folder,
+            env=environment(),
+            capture_output=True,
+            check=False,
+            text=True,
+        )
+        assert process.returncode == 0, process.stdout + process.stderr
+        return process.stdout
+
+    @contextmanager
+    def node(self, name: str, domain: int) -> Iterator[subprocess.Popen[str]]:
+        """Run a node of the workspace, which is killed if it takes too long."""
+        process = subprocess.Popen(
+            ["bash", "-ec", f"source install/setup.bash\nexec install/{name}"],
+            cwd=self.folder,
+            env=environment(
+                PYTHONUNBUFFERED="1", ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST"
+            ),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        timer = threading.Timer(SECONDS, process.kill)
+        timer.start()
+        try:
+            yield process
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+            timer.cancel()
+
+    def received(self, prefix: str = "track_node/") -> str:
+        """Run the talker, and return the first line that the listener, which knows nothing of protobuf, prints."""
+        programs = f"{prefix}lib/track_node"
+        with reserve_domain() as domain, self.node(f"{programs}/talker", domain) as talker:
+            with self.node(f"{programs}/listener", domain) as listener:
+                assert listener.stdout is not None
+                for line in listener.stdout:
+                    if "robot" in line:
+                        return line.partition("]: ")[2].strip()
+            assert talker.stdout is not None
+            talker.send_signal(signal.SIGINT)
+            raise AssertionError(f"nothing was received; the talker says: {talker.stdout.read()}")
+
+    def times(self) -> dict[str, int]:
+        """Return when each file was written that our hooks or ROS's generators make."""
+        parts = ("rosidl_proto", "rosidl_generator", ".proto")
+        return {
+            str(path.relative_to(self.folder)): path.stat().st_mtime_ns
+            for top in ("build", "install")
+            for path in (self.folder / top).rglob("*")
+            if path.is_file()
+            and any(part in str(path) for part in parts)
+            and "CMakeFiles" not in path.parts
+            and path.suffix in (".py", ".pyi", ".proto", ".c", ".h", ".hpp", ".cpp", ".so", "")
+            and path.name not in ("Makefile", "parse_arguments", "check_arguments", "depfile")
+        }
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Workspace:
+    """A workspace that was not built yet."""
+    return Workspace(tmp_path / "workspace")
+
+
+def test_from_nothing_to_the_third_build(workspace: Workspace) -> None:
+    output = workspace.build()
+
+    for package in ("track_msgs", "scene_msgs"):
+        assert f"rosidl_generator_proto: {package} gets protobuf types and adapters" in output
+    track = workspace.folder / "install/track_msgs"
+    (site,) = track.glob("lib/python*/site-packages")
+    for path in ("msg/Track", "srv/FindTrack", "action/Follow"):
+        assert (track / f"share/track_msgs/{path}.proto").is_file()
+        for suffix in ("_pb2.py", "_pb2.pyi", "_adapter.py"):
+            assert (site / f"rosidl_proto/track_msgs/{path}{suffix}").is_file()
+    # Dependencies that came as binaries are generated once: std_msgs with track_msgs, and not again with scene_msgs.
+    assert (site / "rosidl_proto/std_msgs/msg/Header_pb2.py").is_file()
+    scene = workspace.folder / "install/scene_msgs"
+    assert not list(scene.glob("lib/python*/site-packages/rosidl_proto/std_msgs"))
+    assert list(scene.glob("lib/python*/site-packages/rosidl_proto/geometry_msgs/msg/Pose_pb2.py"))
+    assert re.fullmatch(r"robot \d+ with scores \[0\.5, 0\.25\]", workspace.received())
+
+    listed = dict(line.split(maxsplit=1) for line in workspace.run("rosidl-proto list").splitlines())
+    assert listed["track_msgs"].endswith(f"adapters in {track}")
+    assert listed["std_msgs"].endswith(f"adapters in {track}")
+    assert listed["scene_msgs"].endswith(f"adapters in {scene}")
+    assert listed["rosgraph_msgs"].endswith(f"adapters in {workspace.folder / 'install/track_node'}")
+    assert "adapters in" not in listed["sensor_msgs"]
+
+    before = workspace.times()
+    workspace.replace("track_msgs/msg/Track.msg", "uint32 id\n", "uint32 id\nfloat32 speed  # in m/s\n")
+    workspace.replace("track_node/track_node/talker.py", 'label="robot"', 'label="robot", speed=1.5')
+    workspace.replace("track_node/track_node/listener.py", "{track.id}", "{track.id} at {track.speed}")
+    workspace.build()
+    assert re.fullmatch(r"robot \d+ at 1\.5 with scores \[0\.5, 0\.25\]", workspace.received())
+    after = workspace.times()
+    changed = {path for path in before if before[path] != after[path]}
+    ours = {path.rpartition("/")[2] for path in changed if "site-packages/rosidl_proto" in path}
+    assert ours == {
+        *("Track_adapter.py", "Track_pb2.py", "Track_pb2.pyi"),
+        # These hold a Track, and so its type hash.
+        *("FindTrack_adapter.py", "Follow_adapter.py", "Scene_adapter.py"),
+    }
+
+    output = workspace.build()
+    assert workspace.times() == after
+    assert "Generating" not in output
+
+
+@pytest.mark.parametrize("layout", [("--symlink-install",), ("--merge-install",)])
+def test_other_layouts(layout: tuple[str, ...], workspace: Workspace) -> None:
+    prefix = "" if "--merge-install" in layout else "track_node/"
+    workspace.build(*layout)
+    assert re.fullmatch(r"robot \d+ with scores \[0\.5, 0\.25\]", workspace.received(prefix))
+    before = workspace.times()
+
+    output = workspace.build(*layout)
+    assert workspace.times() == before
+    assert "Generating" not in output
+
+    workspace.replace("track_msgs/msg/Track.msg", "uint32 id\n", "uint32 id\nfloat32 speed\n")
+    workspace.replace("track_node/track_node/talker.py", 'label="robot"', 'label="robot", speed=1.5')
+    workspace.replace("track_node/track_node/listener.py", "{track.id}", "{track.id} at {track.speed}")
+    workspace.build(*layout)
+    assert re.fullmatch(r"robot \d+ at 1\.5 with scores \[0\.5, 0\.25\]", workspace.received(prefix))
+
+
+def test_from_links_to_copies(workspace: Workspace) -> None:
+    """What links of `--symlink-install` there are in the build of a node package is gone without it."""
+    shutil.rmtree(workspace.file("scene_msgs"))
+    shutil.rmtree(workspace.file("track_msgs"))
+    workspace.build("--symlink-install")
+    link = workspace.folder / "build/track_node/rosidl_proto"
+    assert link.is_symlink()
+
+    workspace.build()
+
+    assert not link.is_symlink()
+    where = workspace.run("python -c 'import rosidl_proto.rosgraph_msgs.msg as msg; print(msg.__file__)'")
+    assert where.startswith(str(workspace.folder / "install/track_node/lib"))
+
+
+def test_options(workspace: Workspace) -> None:
+    shutil.rmtree(workspace.file("scene_msgs"))
+    shutil.rmtree(workspace.file("track_node"))
+    lock_file = workspace.file("track_msgs/rosidl-proto.lock")
+    workspace.build(
+        *("--cmake-args", "-DROSIDL_PROTO_NUMBERING=sequential", "-DROSIDL_PROTO_EVENTS=ON"),
+        "-DROSIDL_PROTO_PYTHON_ROOT=my_protos",
+    )
+    assert '"track_msgs/msg/Track"' in lock_file.read_text(encoding="utf-8")
+    shown = workspace.run(
+        "python -c 'from my_protos.track_msgs.srv import FindTrack_pb2 as pb2; print(dir(pb2))'"
+    )
+    assert "FindTrack_Event" in shown
+    before = lock_file.read_bytes()
+    workspace.build()
+    assert lock_file.read_bytes() == before
+
+    # Without the options, which CMake has kept.
+    shutil.rmtree(workspace.folder / "build")
+    shutil.rmtree(workspace.folder / "install")
+    output = workspace.build("--cmake-args", "-DROSIDL_PROTO_SKIP=ON")
+    assert "rosidl_generator_proto: skipped, since ROSIDL_PROTO_SKIP is set" in output
+    assert not list((workspace.folder / "install").rglob("*.proto"))
+
+
+@pytest.mark.parametrize(
+    ("path", "wrong", "place", "reason"),
+    [
+        (
+            "msg/Track.msg",
+            "int32 3d\n",
+            "9:7",
+            "'3d' is not a valid field name; use lower case letters, digits and single underscores, "
+            "beginning with a letter",
+        ),
+        (
+            "msg/Track.msg",
+            "std_msgs/Heder other\n",
+            "9:16",
+            "std_msgs/msg/Heder was not found, but track_msgs/msg/Track.other",
+        ),
+        (
+            "srv/FindTrack.srv",
+            "int32[<=x] bounded\n",
+            "6:1",
+            "the size of array type 'int32[<=x]' must be a whole number above 0, not 'x'",
+        ),
+    ],
+)
+def test_a_wrong_definition(path: str, wrong: str, place: str, reason: str, workspace: Workspace) -> None:
+    shutil.rmtree(workspace.file("scene_msgs"))
+    shutil.rmtree(workspace.file("track_node"))
+    file = workspace.file(f"track_msgs/{path}")
+    with file.open("a", encoding="utf-8") as definition:
+        definition.write(wrong)
+
+    output = workspace.build(succeeds=False)
+
+    assert any(f"{file}:{place}" in line and reason in line for line in output.splitlines()), output
+    assert "no protobuf types can be made of track_msgs" in output
+    assert "Traceback" not in output
