@@ -13,8 +13,9 @@ import pytest
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 ONE_PROGRAM = "rclpy.md"  # its blocks are one program, which tests/ros runs
+BUILDS = ("build-colcon.md", "build-setuptools.md", "build-hatch.md")  # tests/hooks runs them
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-NEEDS_ROS = re.compile(r"convert_to_ros_message\(\w+\)  #|import rclpy")
+NEEDS_ROS = re.compile(r"convert_to_ros_message\(\w+\)  #|import rclpy|^rosidl generate", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +42,8 @@ def run(folder: Path, installed: Path, kind: str, text: str) -> None:
 def test_blocks_run(document: Path, installed: Path, tmp_path: Path) -> None:
     if document.name == ONE_PROGRAM:
         pytest.skip("run by tests/ros/test_programs.py")
+    if document.name in BUILDS:
+        pytest.skip("run by tests/hooks")
     for kind, text in BLOCK.findall(document.read_text(encoding="utf-8")):
         if NEEDS_ROS.search(text):
             pytest.importorskip("rclpy", reason="needs a ROS installation")

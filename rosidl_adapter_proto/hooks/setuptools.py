@@ -28,6 +28,10 @@ def finalize_distribution_options(distribution: Distribution) -> None:
         return
     # A project may have nothing but what is generated, and setuptools would then not run build_py.
     distribution.has_pure_modules = lambda: True  # type: ignore[attr-defined, method-assign, unused-ignore]
+    # Commands that are made before build_py runs keep this list, and see what it adds. An editable wheel has data files
+    # only where the distribution says so under this name.
+    distribution.data_files = distribution.data_files or []
+    distribution.has_data = distribution.has_data_files  # type: ignore[attr-defined, unused-ignore]
     for name, extend in (("build_py", _build_py), ("develop", _develop)):
         command: Any = distribution.get_command_class(name)
         if not hasattr(command, "rosidl_proto_project"):
@@ -123,7 +127,6 @@ def add_to_distribution(distribution: Any, folder: Path, command: Any) -> Path |
     distribution.packages = list(distribution.packages or ())
     distribution.package_dir = dict(distribution.package_dir or {})
     distribution.package_data = dict(distribution.package_data or {})
-    distribution.data_files = list(distribution.data_files or ())
     for name, package_folder in project.packages():
         if name not in distribution.packages:
             distribution.packages.append(name)

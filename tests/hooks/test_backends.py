@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
 import venv
 from pathlib import Path
@@ -12,6 +14,7 @@ from tests.folders import content
 from tests.programs import run
 
 ROOT = Path(__file__).parents[2]
+BLOCK = re.compile(r"^```(sh|toml)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 USE = """
 import tracker
 from rosidl_proto.track_msgs.msg import Track, TrackAdapter
@@ -43,6 +46,25 @@ class Project:
             PIP_FIND_LINKS=self._wheels,
             PIP_DISABLE_PIP_VERSION_CHECK="1",
         )
+
+
+@pytest.mark.parametrize("backend", ["setuptools", "hatch"])
+def test_the_document(backend: str, wheel: Path, tmp_path: Path) -> None:
+    """Its commands run, but for the building of the wheel, which is there already."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    (tmp_path / "wheels").symlink_to(wheel.parent)
+    environment = tmp_path / "venv"
+    venv.create(environment, with_pip=True, symlinks=True)
+    blocks = BLOCK.findall((ROOT / f"docs/build-{backend}.md").read_text(encoding="utf-8"))
+    (settings,) = (text for kind, text in blocks if kind == "toml")
+    (commands,) = (text for kind, text in blocks if kind == "sh")
+    assert settings == (ROOT / f"examples/{backend}_project/pyproject.toml").read_text(encoding="utf-8")
+
+    commands = re.sub("^pip wheel .*$", "", commands, flags=re.MULTILINE)
+    path = os.pathsep.join([str(environment / "bin"), os.environ["PATH"]])
+    run("bash", "-euc", commands, folder=tmp_path, PATH=path)
+
+    assert run(environment / "bin/python", "-c", USE, folder=environment) == "track_msgs.msg.pb.Track\n"
 
 
 @pytest.mark.parametrize("options", [(), ("--editable",)], ids=["wheel", "editable"])

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.programs import run
 from tests.ros.support import reserve_domain
 
 pytestmark = pytest.mark.skipif(find_spec("colcon_core") is None, reason="needs colcon: make test-colcon")
@@ -69,16 +70,7 @@ class Workspace:
 
     def run(self, script: str) -> str:
         """Run a shell script where the workspace is sourced, and return what it prints."""
-        process = subprocess.run(
-            ["bash", "-ec", f"source install/setup.bash\n{script}"],
-            cwd=self.folder,
-            env=environment(),
-            capture_output=True,
-            check=False,
-            text=True,
-        )
-        assert process.returncode == 0, process.stdout + process.stderr
-        return process.stdout
+        return run("bash", "-ec", f"source install/setup.bash\n{script}", folder=self.folder, **environment())
 
     @contextmanager
     def node(self, name: str, domain: int) -> Iterator[subprocess.Popen[str]]:
@@ -134,6 +126,16 @@ class Workspace:
 def workspace(tmp_path: Path) -> Workspace:
     """A workspace that was not built yet."""
     return Workspace(tmp_path / "workspace")
+
+
+def test_the_document(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    document = (ROOT / "docs" / "build-colcon.md").read_text(encoding="utf-8")
+    (commands,) = re.findall(r"^```sh\n(.*?)^```", document, re.MULTILINE | re.DOTALL)
+
+    printed = run("bash", "-ec", commands, folder=tmp_path, **environment())
+
+    assert re.search(r"^track_msgs .* adapters in .*/install/track_msgs$", printed, re.MULTILINE)
 
 
 def test_from_nothing_to_the_third_build(workspace: Workspace) -> None:
