@@ -94,6 +94,19 @@ class NodeMixin:
     Its methods are also functions of this module, which take any node as their first argument.
     """
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Check the order of base classes.
+
+        Raises:
+            TypeError: The methods of a node class hide those of the mixin.
+        """
+        super().__init_subclass__(**options)
+        bases = cls.__mro__
+        if rclpy.node.Node in bases and bases.index(rclpy.node.Node) < bases.index(NodeMixin):
+            raise TypeError(
+                f"class {cls.__name__}: NodeMixin has no effect behind a node class; put it first"
+            )
+
     @overload
     def create_publisher(
         self: Any,
@@ -271,10 +284,16 @@ class NodeMixin:
             AdapterNotFoundError: The protobuf class has no adapter.
             RosNotFoundError: The ROS message class cannot be imported.
             TypeHashError: The adapter was generated for another version of the type than the installed one.
+            TypeError: `on_conversion_error` is given, and nothing is to be converted.
         """
         node = cast(rclpy.node.Node, self)
         create = _method_of_base(node, "create_subscription")
         adapter = find_adapter(TypeAdapter, msg_type)
+        if on_conversion_error is not None and (adapter is None or raw):
+            raise TypeError(
+                f"the subscription to {topic} converts nothing, so it takes no on_conversion_error; "
+                "leave it out, or give an adapter and no `raw`"
+            )
         if adapter is None:
             return create(msg_type, topic, callback, qos_profile, raw=raw, **options)
         ros_type = adapter.ros_message_type

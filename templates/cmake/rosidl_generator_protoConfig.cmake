@@ -65,7 +65,8 @@ macro(_rosidl_generator_proto_run command)
   if(NOT _proto_result EQUAL 0)
     message(FATAL_ERROR
       "rosidl_generator_proto: no protobuf types can be made of ${PROJECT_NAME}; the reason is printed above. "
-      "To build without them, set ROSIDL_PROTO_SKIP.")
+      "To build without them, set ROSIDL_PROTO_SKIP; to use another Python than ${_proto_python}, "
+      "set ROSIDL_PROTO_PYTHON.")
   endif()
 endmacro()
 

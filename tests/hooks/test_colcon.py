@@ -153,7 +153,8 @@ def test_from_nothing_to_the_third_build(workspace: Workspace) -> None:
     assert (site / "rosidl_proto/std_msgs/msg/Header_pb2.py").is_file()
     scene = workspace.folder / "install/scene_msgs"
     assert not list(scene.glob("lib/python*/site-packages/rosidl_proto/std_msgs"))
-    assert list(scene.glob("lib/python*/site-packages/rosidl_proto/geometry_msgs/msg/Pose_pb2.py"))
+    for path in ("geometry_msgs/msg/Pose", "scene_msgs/msg/Light"):
+        assert list(scene.glob(f"lib/python*/site-packages/rosidl_proto/{path}_adapter.py"))
     assert re.fullmatch(r"robot \d+ with scores \[0\.5, 0\.25\]", workspace.received())
 
     listed = dict(line.split(maxsplit=1) for line in workspace.run("rosidl-proto list").splitlines())

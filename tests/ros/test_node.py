@@ -627,6 +627,27 @@ def test_a_mixin_before_a_class_of_the_user(ros: None, adapter: Any) -> None:
     assert created == ["/parameter_events", "traced"]
 
 
+def test_a_mixin_behind_a_node_class(ros: None) -> None:
+    from rclpy.node import Node
+
+    from rosidl_adapter_proto.ros import NodeMixin
+
+    with pytest.raises(TypeError) as raised:
+        type("Wrong", (Node, NodeMixin), {})
+
+    assert str(raised.value) == "class Wrong: NodeMixin has no effect behind a node class; put it first"
+
+
+def test_conversion_errors_of_what_is_not_converted(node: Any, adapter: Any) -> None:
+    for msg_type, options in ((adapter.ros_message_type, {}), (adapter, {"raw": True})):
+        with pytest.raises(TypeError) as raised:
+            node.create_subscription(msg_type, "topic", print, 10, on_conversion_error=print, **options)
+        assert str(raised.value) == (
+            "the subscription to topic converts nothing, so it takes no on_conversion_error; "
+            "leave it out, or give an adapter and no `raw`"
+        )
+
+
 def test_a_node_destroyed_while_messages_arrive(native_node: Any, adapter: Any) -> None:
     from rosidl_adapter_proto.ros import Node
 
