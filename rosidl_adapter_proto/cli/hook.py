@@ -25,7 +25,7 @@ def hook_group() -> None:
     "--prefix",
     type=click.Path(path_type=Path),
     required=True,
-    help="A prefix in AMENT_PREFIX_PATH, such as /opt/ros/kilted or the install folder of a workspace.",
+    help="A prefix in AMENT_PREFIX_PATH, such as /opt/ros/kilted.",
 )
 def install_command(prefix: Path) -> None:
     """Install the ament_cmake hook to a prefix.

@@ -28,7 +28,8 @@ def list_command(package: str | None, include: tuple[Path, ...], distro: str | N
             found = sources.packages.get(name, {})
             places = [next(iter(found.values())).origin if found else "no definitions"]
             if name in installed:
-                places.append(f"adapters in {installed[name].prefix}")
+                number = installed[name].generated.interfaces
+                places.append(f"{number} with adapters in {installed[name].prefix}")
             rows.append((name, str(len(found)), ", ".join(places)))
     else:
         rows = [

@@ -41,7 +41,6 @@ __all__ = (
     "check_definitions",
     "generate",
     "proto_text",
-    "tool_files",
 )
 
 Progress = Callable[[int, int], None]
@@ -127,10 +126,10 @@ def check_definitions(request: Request, sources: Sources, options: Options = Opt
     Raises:
         DefinitionError: A definition is missing or not valid.
         SchemaError: An interface cannot be mapped to protobuf, or the lock file disagrees.
-        GenerateError: The lock file cannot be read.
+        GenerateError: The lock file cannot be read, or the name of the Python package is none.
     """
     names = closure(sources, request.packages, request.types, events=options.events)
-    _proto_files(names, sources, options, _numbering(options, _read_lock(options)))
+    _proto_files(names, request, sources, options, _numbering(options, _read_lock(options)))
     return names
 
 
@@ -163,8 +162,7 @@ def _generate_files(
     from rosidl_adapter_proto.generate.python import Names, python_modules
     from rosidl_adapter_proto.generate.render import render, render_modules, render_packages
 
-    _check_python_root(options.python_root)
-    protos = _proto_files(names, sources, options, numbering)
+    protos = _proto_files(names, request, sources, options, numbering)
     texts = {file.path: render("proto/interface.proto.jinja", file=file) for file in protos}
     wanted = [file for file in protos if _is_wanted(file.source.name, request)]
     descriptors = compile_protos(texts, [file.path for file in wanted])
@@ -184,11 +182,17 @@ def _generate_files(
 
 
 def _proto_files(
-    names: Iterable[TypeName], sources: Sources, options: Options, numbering: Numbering
+    names: Iterable[TypeName], request: Request, sources: Sources, options: Options, numbering: Numbering
 ) -> list[ProtoFile]:
+    _check_python_root(options.python_root)
+    # What is only referred to is numbered elsewhere. Its numbers make no difference here, and belong into no lock file.
+    others = SequentialNumbering.from_lock("", None)
     protos = [
         proto_file(
-            sources.definition(name).interface, numbering, sources.definition_name, events=options.events
+            sources.definition(name).interface,
+            numbering if _is_wanted(name, request) else others,
+            sources.definition_name,
+            events=options.events,
         )
         for name in names
     ]
@@ -274,17 +278,14 @@ _IN_EVERY_SERVICE = (
 """The type hash of a service covers its `_Event`, even where that is not generated."""
 
 
-def tool_files() -> list[Path]:
-    """Return the files of this program that decide what is generated."""
+def _tool_digest() -> str:
+    """Return a digest of this program: what it generates may change with any of its files and libraries."""
     package = Path(__file__).resolve().parent.parent
     folders = [package / name for name in ("interfaces", "schema", "generate", "templates")]
     folders.append(package.parent / "templates")
     files = sorted(file for folder in folders if folder.is_dir() for file in folder.rglob("*.*"))
-    return [file for file in files if file.suffix in (".py", ".jinja", ".lark")]
-
-
-def _tool_digest() -> str:
-    """Return a digest of this program: what it generates may change with any of its files and libraries."""
-    parts = [file.name + digest(file.read_bytes()) for file in tool_files()]
+    parts = [
+        file.name + digest(file.read_bytes()) for file in files if file.suffix in (".py", ".jinja", ".lark")
+    ]
     parts += [version(library) for library in ("black", "grpcio-tools", "jinja2")]
     return digest("".join(parts).encode())

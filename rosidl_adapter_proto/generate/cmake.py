@@ -39,8 +39,8 @@ def install_hook(prefix: Path) -> list[Path]:
     """
     if not (prefix / "share" / "ament_index").is_dir():
         raise GenerateError(
-            f"{prefix} is not the prefix of a ROS installation or workspace: it has no share/ament_index; "
-            "give one of those in AMENT_PREFIX_PATH"
+            f"{prefix} is not a prefix of ROS packages: it has no share/ament_index; give one of those in "
+            "AMENT_PREFIX_PATH, of a workspace one such as install/<package>"
         )
     contents = {f"{CMAKE_FOLDER}/{file.name}": file.read_bytes() for file in sorted(cmake_folder().iterdir())}
     python = f'set(_{CMAKE_PACKAGE}_python "{Path(sys.executable).as_posix()}")\n'

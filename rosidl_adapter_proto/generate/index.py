@@ -78,28 +78,31 @@ def _essence(text: str) -> str:
     return "".join(f"{line.rstrip()}\n" for line in text.splitlines() if line.strip())
 
 
-def installed_packages(prefixes: Iterable[Path]) -> Mapping[str, InstalledPackage]:
-    """Return what is installed of each package, and the first prefix that has it.
+def installed_package(prefix: Path, name: str) -> GeneratedPackage | None:
+    """Return what is installed of a package in a prefix; None if nothing is.
 
     Raises:
-        GenerateError: A resource cannot be read.
+        GenerateError: The resource is damaged, or of another version of this program.
     """
-    found: dict[str, InstalledPackage] = {}
-    for prefix in prefixes:
-        try:
-            files = sorted((prefix / RESOURCE_FOLDER).iterdir())
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        for file in files:
-            found.setdefault(file.name, InstalledPackage(prefix, _read(file)))
-    return found
-
-
-def _read(file: Path) -> GeneratedPackage:
+    file = prefix / RESOURCE_FOLDER / name
     try:
         return GeneratedPackage(**json.loads(file.read_bytes()))
+    except (FileNotFoundError, NotADirectoryError):
+        return None
     except (OSError, ValueError, TypeError) as error:
         raise GenerateError(
             f"{file} is not a resource that this version of rosidl-proto reads ({error}); "
             "install its package again, or remove the file"
         ) from None
+
+
+def installed_packages(prefixes: Iterable[Path]) -> Mapping[str, InstalledPackage]:
+    """Return every package that is installed, from the first prefix that has it; errors as of `installed_package`."""
+    found: dict[str, InstalledPackage] = {}
+    for prefix in prefixes:
+        folder = prefix / RESOURCE_FOLDER
+        for name in sorted(file.name for file in folder.iterdir()) if folder.is_dir() else ():
+            package = installed_package(prefix, name)
+            if package is not None:
+                found.setdefault(name, InstalledPackage(prefix, package))
+    return found

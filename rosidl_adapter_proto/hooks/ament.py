@@ -4,38 +4,35 @@
 
 `parse` and `check` run when the package is configured, so that our errors, which name the place, come before those of
 ROS. `generate` runs when it is built. It writes two folders: `package` with what is generated of the package itself,
-and `dependencies` with the packages that it needs and that nobody has installed: those of a ROS that came as binaries.
+which CMake installs, and `dependencies` with the packages that it needs and that do not come with its dependencies:
+those of a ROS that came as binaries. `install` installs these.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
-from rosidl_adapter_proto.errors import Error
-from rosidl_adapter_proto.generate import (
-    Options,
-    Request,
-    check_definitions,
-    generate,
-    tool_files,
-)
+import rosidl_adapter_proto
+from rosidl_adapter_proto.errors import Error, GenerateError
+from rosidl_adapter_proto.generate import Options, Request, check_definitions, generate
 from rosidl_adapter_proto.generate.configuration import NUMBERINGS
-from rosidl_adapter_proto.generate.index import RESOURCE_TYPE, generated_packages, installed_packages
+from rosidl_adapter_proto.generate.index import RESOURCE_FOLDER, generated_packages, installed_package
+from rosidl_adapter_proto.generate.layout import alone_in, replace_file
 from rosidl_adapter_proto.generate.manifest import read_manifest
-from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.sources import (
     Source,
     Sources,
+    closure,
     folder_source,
     interface_source,
     prefix_sources,
-    prefixes,
     store_source,
 )
+from rosidl_adapter_proto.schema.numbering import SequentialNumbering
 
 PACKAGE_FOLDER = "package"
 DEPENDENCIES_FOLDER = "dependencies"
@@ -55,6 +52,8 @@ class Build:
         dependencies: The `share` folders of the packages that it depends on.
         output: The folder to write.
         options: How to generate.
+        prefix: The prefix to install to.
+        python_folder: The folder of Python packages in that.
     """
 
     package: str
@@ -62,6 +61,8 @@ class Build:
     dependencies: tuple[Path, ...]
     output: Path
     options: Options
+    prefix: Path
+    python_folder: str
 
     def own_source(self) -> Source:
         """Return the definitions of the package.
@@ -91,6 +92,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tuple(given.dependency),
         given.output,
         Options(given.numbering, given.lock_file, given.events, given.python_root),
+        given.prefix,
+        given.python_folder,
     )
     try:
         COMMANDS[given.command](build)
@@ -120,7 +123,7 @@ def check(build: Build) -> None:
 
 
 def generate_package(build: Build) -> None:
-    """Generate a package, and those of its dependencies that are not installed.
+    """Generate a package, and those of its dependencies that nobody provides.
 
     Raises:
         Error: Something is wrong with a definition, or files cannot be written.
@@ -130,39 +133,78 @@ def generate_package(build: Build) -> None:
     result = generate(own, sources, build.output / PACKAGE_FOLDER, build.options)
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
-    needed = [name for name in result.interfaces if name.package != build.package]
+    needed = {name.package for name in result.interfaces} - {build.package}
+    missing = tuple(sorted(needed - _provided(build, sources)))
     folder = build.output / DEPENDENCIES_FOLDER
-    missing = _missing(needed, sources, build.options, folder)
     if missing or read_manifest(folder) is not None:
         generate(Request(missing, dependencies=False), sources, folder, build.options)
-    files = [sources.definition(name).file for name in result.interfaces]
-    _write_depfile(build.output, [file for file in files if Path(file).is_file()])
+    _write_depfile(build)
 
 
-def _missing(needed: Iterable[TypeName], sources: Sources, options: Options, folder: Path) -> tuple[str, ...]:
-    """Return the packages to generate: those that are not installed from the same definitions in the same way.
+def _provided(build: Build, sources: Sources) -> set[str]:
+    """Return the packages that come with the dependencies of a package.
 
-    What this build has generated once it goes on generating: the installed package that it finds is its own.
+    A dependency that was built with this hook, from the same definitions and in the same way, has seen to everything
+    that it needs itself. What else happens to be installed may be gone tomorrow, and does not count.
     """
-    manifest = read_manifest(folder)
-    outputs = manifest.outputs if manifest else ()
-    made_here = {PurePosixPath(path).name for path in outputs if path.startswith(f"index/{RESOURCE_TYPE}/")}
-    installed = installed_packages(prefixes())
-    return tuple(
-        package
-        for package, generated in generated_packages(needed, sources, options).items()
-        if package in made_here or package not in installed or installed[package].generated != generated
-    )
+    provided: set[str] = set()
+    for folder in build.dependencies:
+        (name,) = folder_source(folder).packages
+        try:
+            installed = installed_package(folder.parents[1], name)
+        except GenerateError:
+            continue  # another version of this program has made it: it is made again, here
+        if installed == generated_packages(sources.package(name), sources, build.options)[name]:
+            provided.update(each.package for each in closure(sources, [name], events=build.options.events))
+    return provided
 
 
-def _write_depfile(output: Path, files: Iterable[str | Path]) -> None:
-    stamp = output / STAMP_FILE
-    target, *needs = [str(file).replace(" ", r"\ ") for file in (stamp, *files, *tool_files())]
-    (output / DEPFILE).write_text(f"{target}: " + " \\\n  ".join(needs) + "\n", encoding="utf-8")
+def _write_depfile(build: Build) -> None:
+    """Write what the output depends on, besides the definitions, which CMake knows."""
+    needs = [Path(rosidl_adapter_proto.__file__)]
+    needs += [folder.parents[1] / RESOURCE_FOLDER / folder.name for folder in build.dependencies]
+    if build.options.numbering == SequentialNumbering.name:
+        needs.append(build.options.lock_file)
+    stamp = build.output / STAMP_FILE
+    target, *files = [str(file).replace(" ", r"\ ") for file in (stamp, *filter(Path.exists, needs))]
+    (build.output / DEPFILE).write_text(f"{target}: " + " \\\n  ".join(files) + "\n", encoding="utf-8")
     stamp.touch()
 
 
-COMMANDS = {"parse": parse, "check": check, "generate": generate_package}
+def install_dependencies(build: Build) -> None:
+    """Install the dependencies that were generated. Packages that are built at the same time may install the same ones.
+
+    Raises:
+        GenerateError: Files cannot be written.
+    """
+    folder = build.output / DEPENDENCIES_FOLDER
+    manifest = read_manifest(folder)
+    places = {"proto": "share", "index": "share/ament_index/resource_index", "python": build.python_folder}
+    try:
+        build.prefix.mkdir(parents=True, exist_ok=True)
+        with alone_in(build.prefix):
+            for path in manifest.outputs if manifest else ():
+                part, _, rest = path.partition("/")
+                if part in places:
+                    _install(folder / path, build.prefix / places[part] / rest)
+    except OSError as error:
+        raise GenerateError(f"cannot write to {build.prefix}: {error.strerror} ({error.filename})") from None
+
+
+def _install(file: Path, place: Path) -> None:
+    content = file.read_bytes()
+    if not place.is_file() or place.read_bytes() != content:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.unlink(missing_ok=True)  # a link of `--symlink-install` leads into the folder of another build
+        replace_file(place, content)
+
+
+COMMANDS = {
+    "parse": parse,
+    "check": check,
+    "generate": generate_package,
+    "install": install_dependencies,
+}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -179,6 +221,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--lock-file", type=Path, default=default.lock_file)
     parser.add_argument("--events", action="store_true")
     parser.add_argument("--python-root", default=default.python_root)
+    parser.add_argument("--prefix", type=Path, default=Path())
+    parser.add_argument("--python-folder", default="")
     return parser
 
 

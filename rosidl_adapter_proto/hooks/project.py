@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosidl_adapter_proto.generate import generate
+from rosidl_adapter_proto.generate import Request, generate
 from rosidl_adapter_proto.generate.configuration import Configuration
 
 
@@ -43,7 +43,7 @@ class GeneratedProject:
 
 
 def generate_project(configuration: Configuration, output: Path) -> GeneratedProject:
-    """Generate what a configuration names.
+    """Generate what a configuration names; of a type, its whole package.
 
     Args:
         configuration: The configuration; its `output` is for the command line alone.
@@ -53,7 +53,10 @@ def generate_project(configuration: Configuration, output: Path) -> GeneratedPro
         Error: The configuration or a definition is wrong, or files cannot be written.
     """
     request, sources, options = configuration.request()
-    result = generate(request, sources, output, options)
+    # Other projects may install the same package, and Python takes all of it from one of them: so it comes whole.
+    packages = dict.fromkeys((*request.packages, *(name.package for name in request.types)))
+    whole = Request(tuple(packages), dependencies=request.dependencies)
+    result = generate(whole, sources, output, options)
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
     return GeneratedProject(output, options.python_root)

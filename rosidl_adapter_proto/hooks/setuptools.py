@@ -30,7 +30,7 @@ def finalize_distribution_options(distribution: Distribution) -> None:
     distribution.has_pure_modules = lambda: True  # type: ignore[attr-defined, method-assign, unused-ignore]
     # Commands that are made before build_py runs keep this list, and see what it adds. An editable wheel has data files
     # only where the distribution says so under this name.
-    distribution.data_files = distribution.data_files or []
+    distribution.data_files = list(distribution.data_files or ())
     distribution.has_data = distribution.has_data_files  # type: ignore[attr-defined, unused-ignore]
     for name, extend in (("build_py", _build_py), ("develop", _develop)):
         command: Any = distribution.get_command_class(name)

@@ -172,7 +172,7 @@ def interface_source(package: str, interfaces: Iterable[str]) -> Source:
         interfaces: Its definitions: paths such as `msg/Track.msg`, which may follow a base folder and a colon.
 
     Raises:
-        DefinitionError: One is not in a folder msg, srv or action.
+        DefinitionError: One is not in a folder msg, srv or action, or has another suffix.
     """
     definitions: dict[TypeName, Definition] = {}
     for interface in interfaces:
@@ -181,7 +181,8 @@ def interface_source(package: str, interfaces: Iterable[str]) -> Source:
         namespace = Path(relative).parent.name
         if namespace not in NAMESPACES or file.suffix not in (".idl", f".{namespace}"):
             raise DefinitionError(
-                f"{file} is not in a folder msg, srv or action, which says what it defines; move it to one"
+                f"{file} is no definition: it has to be msg/<Name>.msg, srv/<Name>.srv or action/<Name>.action, "
+                "or an .idl file in one of these folders"
             )
         name = TypeName(package, namespace, file.stem)
         definitions[name] = Definition(name, file.suffix, str(file), f"package {package}")

@@ -62,7 +62,11 @@ macro(_rosidl_generator_proto_run command)
   file(WRITE "${_proto_arguments_file}.new" "${_proto_text}\n")
   configure_file("${_proto_arguments_file}.new" "${_proto_arguments_file}" COPYONLY)
   execute_process(COMMAND ${_proto_command} ${command} "@${_proto_arguments_file}" RESULT_VARIABLE _proto_result)
-  if(NOT _proto_result EQUAL 0)
+  if(NOT _proto_result MATCHES "^[0-9]+$")
+    message(FATAL_ERROR
+      "rosidl_generator_proto: ${_proto_python} cannot be run (${_proto_result}); set ROSIDL_PROTO_PYTHON to a Python "
+      "that has rosidl_adapter_proto, or ROSIDL_PROTO_SKIP to build without protobuf types.")
+  elseif(NOT _proto_result EQUAL 0)
     message(FATAL_ERROR
       "rosidl_generator_proto: no protobuf types can be made of ${PROJECT_NAME}; the reason is printed above. "
       "To build without them, set ROSIDL_PROTO_SKIP; to use another Python than ${_proto_python}, "

@@ -7,9 +7,18 @@ endif()
 
 _rosidl_generator_proto_arguments(
   "${CMAKE_CURRENT_BINARY_DIR}/rosidl_generator_proto/${rosidl_generate_interfaces_TARGET}")
+set(_proto_dependencies "")
+set(_proto_descriptions "")
 foreach(_package ${rosidl_generate_interfaces_DEPENDENCY_PACKAGE_NAMES})
   get_filename_component(_share "${${_package}_DIR}/.." ABSOLUTE)
   list(APPEND _proto_arguments --dependency "${_share}")
+  foreach(_idl_file ${${_package}_IDL_FILES})
+    list(APPEND _proto_dependencies "${_share}/${_idl_file}")
+    string(REGEX REPLACE "\\.idl$" ".json" _description "${_share}/${_idl_file}")
+    if(EXISTS "${_description}")
+      list(APPEND _proto_descriptions "${_description}")
+    endif()
+  endforeach()
 endforeach()
 _rosidl_generator_proto_run(check)
 
@@ -19,7 +28,7 @@ endif()
 add_custom_command(
   OUTPUT "${_proto_output}/stamp"
   COMMAND ${_proto_command} generate "@${_proto_arguments_file}"
-  DEPENDS ${_proto_definitions} "${_proto_arguments_file}"
+  DEPENDS ${_proto_definitions} ${_proto_dependencies} "${_proto_arguments_file}"
   DEPFILE "${_proto_output}/depfile"
   COMMENT "Generating protobuf types and adapters"
   VERBATIM)
@@ -35,37 +44,33 @@ if(TARGET ${rosidl_generate_interfaces_TARGET}__rosidl_generator_type_descriptio
   get_filename_component(_folder "${_idl_file}" DIRECTORY)
   get_filename_component(_folder "${_folder}" NAME)
   get_filename_component(_name "${_idl_file}" NAME_WE)
-  set(_descriptions "")
-  foreach(_package ${rosidl_generate_interfaces_DEPENDENCY_PACKAGE_NAMES})
-    foreach(_idl_file ${${_package}_IDL_FILES})
-      string(REGEX REPLACE "\\.idl$" ".json" _description "${${_package}_DIR}/../${_idl_file}")
-      if(EXISTS "${_description}")
-        list(APPEND _descriptions "${_description}")
-      endif()
-    endforeach()
-  endforeach()
   add_custom_command(
     OUTPUT "${CMAKE_CURRENT_BINARY_DIR}/rosidl_generator_type_description/${PROJECT_NAME}/${_folder}/${_name}.json"
-    APPEND DEPENDS ${_descriptions})
+    APPEND DEPENDS ${_proto_descriptions})
 endif()
 
 if(NOT rosidl_generate_interfaces_SKIP_INSTALL)
   _ament_cmake_python_register_environment_hook()
   ament_get_python_install_dir(_proto_python_install_dir)
-  foreach(_part dependencies package)
-    install(
-      DIRECTORY "${_proto_output}/${_part}/proto/"
-      DESTINATION "share"
-      OPTIONAL)
-    install(
-      DIRECTORY "${_proto_output}/${_part}/python/"
-      DESTINATION "${_proto_python_install_dir}"
-      OPTIONAL
-      PATTERN "__pycache__" EXCLUDE)
-    install(
-      DIRECTORY "${_proto_output}/${_part}/index/"
-      DESTINATION "share/ament_index/resource_index"
-      OPTIONAL)
-  endforeach()
+  install(
+    DIRECTORY "${_proto_output}/package/proto/"
+    DESTINATION "share")
+  install(
+    DIRECTORY "${_proto_output}/package/python/"
+    DESTINATION "${_proto_python_install_dir}"
+    PATTERN "__pycache__" EXCLUDE)
+  install(
+    DIRECTORY "${_proto_output}/package/index/"
+    DESTINATION "share/ament_index/resource_index")
+  # Packages that are built at the same time may have the same dependencies: CMake would stumble over its own copies.
+  list(JOIN _proto_command "\" \"" _proto_install)
+  install(CODE "
+    execute_process(
+      COMMAND \"${_proto_install}\" install \"@${_proto_arguments_file}\"
+        --prefix \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}\" --python-folder \"${_proto_python_install_dir}\"
+      RESULT_VARIABLE _proto_result)
+    if(NOT _proto_result EQUAL 0)
+      message(FATAL_ERROR \"rosidl_generator_proto: the dependencies of ${PROJECT_NAME} cannot be installed\")
+    endif()")
 endif()
 message(STATUS "rosidl_generator_proto: ${PROJECT_NAME} gets protobuf types and adapters")

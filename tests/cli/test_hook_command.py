@@ -39,8 +39,8 @@ def test_a_folder_that_is_no_prefix(folder: Path, run: Run) -> None:
 
     assert (ended.code, ended.out) == (3, "")
     assert ended.err == (
-        "Error: ros is not the prefix of a ROS installation or workspace: it has no share/ament_index; "
-        "give one of those in AMENT_PREFIX_PATH\n"
+        "Error: ros is not a prefix of ROS packages: it has no share/ament_index; give one of those in "
+        "AMENT_PREFIX_PATH, of a workspace one such as install/<package>\n"
     )
     assert not (folder / "ros").exists()
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
+import rosidl_adapter_proto
 from rosidl_adapter_proto.generate.index import RESOURCE_FOLDER
 from rosidl_adapter_proto.hooks.ament import main
 from tests.folders import content, write_package
@@ -51,40 +54,99 @@ def test_generate(build: Path, folder: Path, capsys: pytest.CaptureFixture[str])
             *(f"python/rosidl_proto/{package}{end}" for end in ("_pb2.py", "_pb2.pyi", "_adapter.py")),
             *(f"python/rosidl_proto/{os.path.dirname(package)}/{end}" for end in ("__init__.py", "py.typed")),
         }
-    depfile = (folder / "build/depfile").read_text()
-    assert depfile.startswith(f"{folder}/build/stamp: ")
-    assert f"{folder}/src/track_msgs/msg/Track.msg \\\n" in depfile
-    assert f"{folder}/ros/share/std_msgs/msg/Header.msg \\\n" in depfile
-    assert "templates/python/adapter.py.jinja" in depfile
-    assert (folder / "build/stamp").is_file()
+    stamp, needs = (folder / "build/depfile").read_text().rstrip("\n").split(": ")
+    assert stamp == f"{folder}/build/stamp"
+    assert Path(stamp).is_file()
+    assert needs == rosidl_adapter_proto.__file__
 
 
-def test_installed_dependencies(build: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They are not made again, unless they were made from other definitions, or in another way, or by this build."""
-    run("generate", build)
+def made_again(build: Path) -> set[str]:
+    """Generate from nothing, and return the dependencies that were generated."""
+    output = build.parent / "build"
+    shutil.rmtree(output, ignore_errors=True)
+    assert run("generate", build) == 0
+    index = output / "dependencies/index/rosidl_proto"
+    return {file.name for file in index.iterdir()} if index.is_dir() else set()
+
+
+def resource(prefix: Path, name: str) -> Path:
+    file = prefix / RESOURCE_FOLDER / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    return file
+
+
+def test_what_comes_with_a_dependency(build: Path, folder: Path) -> None:
+    """It is not made again, unless it was made from other definitions, or in another way."""
+    assert made_again(build) == {"std_msgs"}
     made = (folder / "build/dependencies/index/rosidl_proto/std_msgs").read_bytes()
-    resource = folder / "other" / RESOURCE_FOLDER / "std_msgs"
-    resource.parent.mkdir(parents=True)
-    resource.write_bytes(made)
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(folder / "other"))
-    assert run("generate", build) == 0
-    assert (folder / "build/dependencies/proto/std_msgs").is_dir(), "it goes on making what it made"
+    file = resource(folder / "ros", "std_msgs")
+    file.write_bytes(made)
+    assert made_again(build) == set()
+    assert str(file) in (folder / "build/depfile").read_text()
 
-    build.write_text(build.read_text().replace(f"{folder}/build", f"{folder}/second"))
-    assert run("generate", build) == 0
-    assert (folder / "second/package/proto/track_msgs").is_dir()
-    assert not (folder / "second/dependencies").exists()
+    for other in (made.replace(b'"hash"', b'"sequential"'), b"{", b"[]", b'{"of": "another version"}'):
+        file.write_bytes(other)
+        assert made_again(build) == {"std_msgs"}
 
-    resource.write_bytes(made.replace(b'"hash"', b'"sequential"'))
-    build.write_text(build.read_text().replace(f"{folder}/second", f"{folder}/third"))
-    assert run("generate", build) == 0
-    assert (folder / "third/dependencies/proto/std_msgs").is_dir()
-
-    resource.write_bytes(made)
+    file.write_bytes(made)
     (folder / "ros/share/std_msgs/msg/Header.msg").write_text("string frame_id\nuint32 seq\n")
-    build.write_text(build.read_text().replace(f"{folder}/third", f"{folder}/fourth"))
-    assert run("generate", build) == 0
-    assert (folder / "fourth/dependencies/proto/std_msgs").is_dir()
+    assert made_again(build) == {"std_msgs"}
+
+
+def test_what_comes_with_a_dependency_of_a_dependency(build: Path, folder: Path) -> None:
+    write_package(folder / "other/share/middle_msgs", {"msg/Middle.msg": "std_msgs/Header header\n"})
+    with build.open("a") as arguments:
+        arguments.write(f"--dependency\n{folder}/other/share/middle_msgs\n")
+    (folder / "src/track_msgs/msg/Track.msg").write_text(
+        "middle_msgs/Middle middle\nstd_msgs/Header header\n"
+    )
+    assert made_again(build) == {"middle_msgs", "std_msgs"}
+    made = (folder / "build/dependencies/index/rosidl_proto/middle_msgs").read_bytes()
+
+    resource(folder / "other", "middle_msgs").write_bytes(made)
+
+    assert made_again(build) == set()
+
+
+def test_what_happens_to_be_installed(build: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What came with a package that this one does not depend on may be gone tomorrow."""
+    made_again(build)
+    made = (folder / "build/dependencies/index/rosidl_proto/std_msgs").read_bytes()
+    resource(folder / "other", "std_msgs").write_bytes(made)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(folder / "other"))
+
+    assert made_again(build) == {"std_msgs"}
+
+
+def test_install(build: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run("generate", build)
+    with build.open("a") as arguments:
+        arguments.write(f"--prefix\n{folder}/prefix\n--python-folder\nlib/site\n")
+    (folder / "prefix/share/std_msgs/msg").mkdir(parents=True)
+    link = folder / "prefix/share/std_msgs/msg/Header.proto"
+    link.symlink_to(folder / "gone")
+
+    assert run("install", build) == 0
+
+    files = {path: data for path, data in content(folder / "prefix").items() if data is not None}
+    assert set(files) == {
+        "share/std_msgs/msg/Header.proto",
+        "share/ament_index/resource_index/rosidl_proto/std_msgs",
+        *(
+            f"lib/site/rosidl_proto/std_msgs/msg/Header{end}"
+            for end in ("_pb2.py", "_pb2.pyi", "_adapter.py")
+        ),
+        *(f"lib/site/rosidl_proto/std_msgs/msg/{end}" for end in ("__init__.py", "py.typed")),
+    }
+    assert not link.is_symlink()
+    before = link.stat()
+    assert run("install", build) == 0
+    assert link.stat() == before
+
+    (folder / "prefix/share").rename(folder / "prefix/away")
+    (folder / "prefix/share").write_text("")
+    assert run("install", build) == 1
+    assert capsys.readouterr().err.startswith(f"cannot write to {folder}/prefix: ")
 
 
 def test_a_dependency_that_is_not_one_any_more(build: Path, folder: Path) -> None:
@@ -97,24 +159,20 @@ def test_a_dependency_that_is_not_one_any_more(build: Path, folder: Path) -> Non
     assert not [path for path in made if "std_msgs" in path]
 
 
-def test_a_damaged_resource(
-    build: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    resource = folder / "other" / RESOURCE_FOLDER / "std_msgs"
-    resource.parent.mkdir(parents=True)
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(folder / "other"))
-    for text, reason in (
-        ("{", "Expecting property name enclosed in double quotes: line 1 column 2 (char 1)"),
-        ("{}", "GeneratedPackage.__init__() missing 5 required positional arguments: "),
-        ("[]", "rosidl_adapter_proto.generate.index.GeneratedPackage() argument after ** must be a mapping"),
-    ):
-        resource.write_text(text)
-        assert run("generate", build) == 1
-        error = capsys.readouterr().err
-        assert error.startswith(
-            f"{resource} is not a resource that this version of rosidl-proto reads ({reason}"
-        )
-        assert error.endswith("); install its package again, or remove the file\n")
+def test_sequential_numbers(build: Path, folder: Path) -> None:
+    """The lock file has what is generated here, and the output depends on it."""
+    lock_file = folder / "numbers.lock"
+    with build.open("a") as arguments:
+        arguments.write(f"--numbering\nsequential\n--lock-file\n{lock_file}\n")
+    assert made_again(build) == {"std_msgs"}
+    assert '"std_msgs/msg/Header"' in lock_file.read_text()
+    assert str(lock_file) in (folder / "build/depfile").read_text()
+
+    made = (folder / "build/dependencies/index/rosidl_proto/std_msgs").read_bytes()
+    resource(folder / "ros", "std_msgs").write_bytes(made)
+    lock_file.unlink()
+    assert made_again(build) == set()
+    assert list(json.loads(lock_file.read_text())["messages"]) == ["track_msgs/msg/Track"]
 
 
 @pytest.mark.parametrize(
@@ -149,13 +207,22 @@ def test_what_is_wrong(
     assert printed.err == error.format(file=file, folder=folder)
 
 
-def test_a_definition_in_another_folder(
-    build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("path", ["types/Track.msg", "msg/Track.txt", "srv/Track.msg"])
+def test_what_is_no_definition(
+    path: str, build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    build.write_text(build.read_text().replace("msg/Track.msg", "types/Track.msg"))
+    build.write_text(build.read_text().replace("msg/Track.msg", path))
 
     assert run("parse", build) == 1
     assert capsys.readouterr().err == (
-        f"{folder}/src/track_msgs/types/Track.msg is not in a folder msg, srv or action, which says what it defines; "
-        "move it to one\n"
+        f"{folder}/src/track_msgs/{path} is no definition: it has to be msg/<Name>.msg, srv/<Name>.srv or "
+        "action/<Name>.action, or an .idl file in one of these folders\n"
     )
+
+
+def test_a_python_root_that_is_no_name(build: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with build.open("a") as arguments:
+        arguments.write("--python-root\nmy-protos\n")
+
+    assert run("check", build) == 1
+    assert capsys.readouterr().err == "'my-protos' cannot be the name of a Python package\n"

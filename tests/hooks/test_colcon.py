@@ -53,9 +53,9 @@ class Workspace:
         assert old in text
         self.file(path).write_text(text.replace(old, new), encoding="utf-8")
 
-    def build(self, *options: str, succeeds: bool = True) -> str:
+    def build(self, *options: str, executor: str = "sequential", succeeds: bool = True) -> str:
         """Build, and return what is printed."""
-        command = ["colcon", "build", "--executor", "sequential", *options]
+        command = ["colcon", "build", "--executor", executor, *options]
         process = subprocess.run(
             [*command, "--event-handlers", "console_direct+"],
             cwd=self.folder,
@@ -202,6 +202,49 @@ def test_other_layouts(layout: tuple[str, ...], workspace: Workspace) -> None:
     assert re.fullmatch(r"robot \d+ at 1\.5 with scores \[0\.5, 0\.25\]", workspace.received(prefix))
 
 
+@pytest.fixture
+def strangers(workspace: Workspace) -> Workspace:
+    """A workspace with two packages that do not know each other, and both need std_msgs."""
+    shutil.rmtree(workspace.file("scene_msgs"))
+    shutil.rmtree(workspace.file("track_node"))
+    shutil.rmtree(workspace.file("track_msgs/srv"))
+    shutil.rmtree(workspace.file("track_msgs/action"))
+    workspace.replace("track_msgs/CMakeLists.txt", "  srv/FindTrack.srv\n  action/Follow.action\n", "")
+    shutil.copytree(workspace.file("track_msgs"), workspace.file("other_msgs"))
+    for file in ("CMakeLists.txt", "package.xml"):
+        workspace.replace(f"other_msgs/{file}", "track_msgs", "other_msgs")
+    return workspace
+
+
+USE_STRANGER = "python -c 'import rosidl_proto.other_msgs.msg as msg; print(msg.Track(id=7).header)'"
+
+
+def test_packages_that_are_built_at_the_same_time(strangers: Workspace) -> None:
+    for _ in range(2):
+        shutil.rmtree(strangers.folder / "install", ignore_errors=True)
+        strangers.build("--merge-install", executor="parallel")
+    strangers.run(USE_STRANGER)
+
+
+def test_packages_do_not_rely_on_strangers(strangers: Workspace) -> None:
+    """Whatever is installed and sourced when a package is built, it has all that it needs."""
+    strangers.build("--symlink-install")
+    strangers.run("rm -r build && colcon build --symlink-install --executor sequential")
+    for folder in ("src", "build", "install"):
+        shutil.rmtree(strangers.folder / folder / "track_msgs")
+    strangers.run(USE_STRANGER)
+
+    shutil.rmtree(strangers.folder / "install")
+    strangers.build("--symlink-install")
+    strangers.run(USE_STRANGER)
+
+    strangers.file("other_msgs/msg/Track.msg").rename(strangers.file("other_msgs/msg/Item.msg"))
+    strangers.replace("other_msgs/CMakeLists.txt", "msg/Track.msg", "msg/Item.msg")
+    strangers.build("--symlink-install")
+    assert "Generating" not in strangers.build("--symlink-install")
+    strangers.run(USE_STRANGER.replace("Track", "Item"))
+
+
 def test_from_links_to_copies(workspace: Workspace) -> None:
     """What links of `--symlink-install` there are in the build of a node package is gone without it."""
     shutil.rmtree(workspace.file("scene_msgs"))
@@ -234,12 +277,28 @@ def test_options(workspace: Workspace) -> None:
     workspace.build()
     assert lock_file.read_bytes() == before
 
+    # As by a change of the lock file that comes from somebody else.
+    lock_file.write_bytes(before.replace(b'"2 fixed32"', b'"9 fixed32"'))
+    workspace.build()
+    proto = workspace.folder / "install/track_msgs/share/track_msgs/msg/Track.proto"
+    assert "fixed32 id = 9;" in proto.read_text(encoding="utf-8")
+
     # Without the options, which CMake has kept.
     shutil.rmtree(workspace.folder / "build")
     shutil.rmtree(workspace.folder / "install")
     output = workspace.build("--cmake-args", "-DROSIDL_PROTO_SKIP=ON")
     assert "rosidl_generator_proto: skipped, since ROSIDL_PROTO_SKIP is set" in output
     assert not list((workspace.folder / "install").rglob("*.proto"))
+
+
+def test_a_python_that_cannot_be_run(workspace: Workspace) -> None:
+    shutil.rmtree(workspace.file("scene_msgs"))
+    shutil.rmtree(workspace.file("track_node"))
+
+    output = workspace.build("--cmake-args", "-DROSIDL_PROTO_PYTHON=/nowhere/python3", succeeds=False)
+
+    assert "rosidl_generator_proto: /nowhere/python3 cannot be run (" in output
+    assert "set ROSIDL_PROTO_PYTHON to a Python that has" in " ".join(output.split())
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,10 @@ class Listener(Node):
 
 
 def main() -> None:
+    rclpy.init()
     try:
-        with rclpy.init():
-            rclpy.spin(Listener())
+        rclpy.spin(Listener())
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    finally:
+        rclpy.try_shutdown()

@@ -30,8 +30,10 @@ class Talker(Node):
 
 
 def main() -> None:
+    rclpy.init()
     try:
-        with rclpy.init():
-            rclpy.spin(Talker())
+        rclpy.spin(Talker())
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    finally:
+        rclpy.try_shutdown()
