@@ -119,7 +119,7 @@ def check(build: Build) -> None:
     Raises:
         Error: Something is wrong with one.
     """
-    check_definitions(Request((build.package,)), build.sources(), build.options)
+    check_definitions(Request((build.package,), dependencies=False), build.sources(), build.options)
 
 
 def generate_package(build: Build) -> None:
