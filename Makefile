@@ -50,8 +50,9 @@ check: $(VENV)/ready
 test-kilted: $(VENV)/ready
 	$(BIN)/python -m pytest
 
+# Projects that pip builds have environments of their own, the same ones as above.
 test-jazzy: $(JAZZY)/ready
-	$(JAZZY)/bin/python -m pytest
+	$(JAZZY)/bin/python -m pytest --ignore=tests/hooks/test_backends.py
 
 test-colcon: $(COLCON)/ready
 	$(COLCON)/bin/pip install --quiet --no-deps .
