@@ -17,8 +17,11 @@ from rosidl_adapter_proto.generate.request import Options
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.sources import Sources
 
+SHARED_FOLDERS = {"proto": "share", "index": "share/ament_index/resource_index"}
+"""Where the folders of an output folder that are not Python's go in a prefix."""
+
 RESOURCE_TYPE = "rosidl_proto"
-RESOURCE_FOLDER = f"share/ament_index/resource_index/{RESOURCE_TYPE}"
+RESOURCE_FOLDER = f"{SHARED_FOLDERS['index']}/{RESOURCE_TYPE}"
 
 
 @dataclass(frozen=True)

@@ -20,18 +20,16 @@ import rosidl_adapter_proto
 from rosidl_adapter_proto.errors import Error, GenerateError
 from rosidl_adapter_proto.generate import Options, Request, check_definitions, generate
 from rosidl_adapter_proto.generate.configuration import NUMBERINGS
-from rosidl_adapter_proto.generate.index import RESOURCE_FOLDER, generated_packages, installed_package
+from rosidl_adapter_proto.generate.index import (
+    RESOURCE_FOLDER,
+    SHARED_FOLDERS,
+    generated_packages,
+    installed_package,
+)
 from rosidl_adapter_proto.generate.layout import alone_in, replace_file
 from rosidl_adapter_proto.generate.manifest import read_manifest
-from rosidl_adapter_proto.interfaces.sources import (
-    Source,
-    Sources,
-    closure,
-    folder_source,
-    interface_source,
-    prefix_sources,
-    store_source,
-)
+from rosidl_adapter_proto.generate.request import find_sources
+from rosidl_adapter_proto.interfaces.sources import Source, Sources, closure, interface_source
 from rosidl_adapter_proto.schema.numbering import SequentialNumbering
 
 PACKAGE_FOLDER = "package"
@@ -78,8 +76,7 @@ class Build:
         Raises:
             DefinitionError: An interface is not in a folder msg, srv or action.
         """
-        dependencies = [folder_source(folder) for folder in self.dependencies]
-        return Sources((self.own_source(), *dependencies, *prefix_sources(), store_source()))
+        return find_sources(self.dependencies, None, [self.own_source()])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -149,7 +146,7 @@ def _provided(build: Build, sources: Sources) -> set[str]:
     """
     provided: set[str] = set()
     for folder in build.dependencies:
-        (name,) = folder_source(folder).packages
+        name = folder.name
         try:
             installed = installed_package(folder.parents[1], name)
         except GenerateError:
@@ -179,7 +176,7 @@ def install_dependencies(build: Build) -> None:
     """
     folder = build.output / DEPENDENCIES_FOLDER
     manifest = read_manifest(folder)
-    places = {"proto": "share", "index": "share/ament_index/resource_index", "python": build.python_folder}
+    places = {**SHARED_FOLDERS, "python": build.python_folder}
     try:
         build.prefix.mkdir(parents=True, exist_ok=True)
         with alone_in(build.prefix):

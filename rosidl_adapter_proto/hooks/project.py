@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rosidl_adapter_proto.generate import Request, generate
 from rosidl_adapter_proto.generate.configuration import Configuration
+from rosidl_adapter_proto.generate.index import SHARED_FOLDERS
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class GeneratedProject:
 
     def shared_files(self) -> Iterator[tuple[Path, str]]:
         """Yield the files that a prefix has outside Python's folders, with their paths in the prefix."""
-        for part, place in (("proto", "share"), ("index", "share/ament_index/resource_index")):
+        for part, place in SHARED_FOLDERS.items():
             for file in sorted((self.output / part).rglob("*")):
                 if file.is_file():
                     yield file, f"{place}/{file.relative_to(self.output / part).as_posix()}"
