@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from rosidl_adapter_proto.interfaces.sources import prefix_sources, store_source
+from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 
 REFERENCE_SECONDS, REFERENCE_INTERFACES = 6.5, 126
 RUNS_WITH_NOTHING_TO_DO = 5

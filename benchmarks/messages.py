@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from rosidl_adapter_proto.generate import Options, Request, generate
-from rosidl_adapter_proto.interfaces.sources import Sources, prefix_sources, store_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 
 TURNS = 60
 SECONDS_PER_TURN = 0.005
@@ -259,7 +260,7 @@ for name in ("Imu", "LaserScan", "Image", "PoseArray"):
 """
 
 
-def size_rows(folder: Path, sources: Sources, messages: list[Any]) -> Iterator[tuple[str, int, int, int]]:
+def size_rows(folder: Path, catalog: Catalog, messages: list[Any]) -> Iterator[tuple[str, int, int, int]]:
     """Yield bytes per message: CDR, protobuf with hash numbers, protobuf with sequential numbers."""
     import pickle
 
@@ -269,7 +270,7 @@ def size_rows(folder: Path, sources: Sources, messages: list[Any]) -> Iterator[t
     sizes = {}
     for numbering in ("hash", "sequential"):
         options = Options(numbering=numbering, lock_file=folder / "rosidl-proto.lock")
-        generate(Request(("sensor_msgs", "geometry_msgs")), sources, folder / numbering, options)
+        generate(Request(("sensor_msgs", "geometry_msgs")), catalog, folder / numbering, options)
         environment = {**os.environ, "PYTHONPATH": str(folder / numbering / "python")}
         process = subprocess.run(
             [sys.executable, "-c", SIZES],
@@ -287,9 +288,9 @@ def main() -> None:
     """Measure, and print both tables."""
     from geometry_msgs.msg import Pose, PoseArray
 
-    sources = Sources((*prefix_sources(), store_source()))
+    catalog = Catalog((*prefix_sources(), store_source()))
     with tempfile.TemporaryDirectory() as folder:
-        generate(Request(("sensor_msgs",)), sources, Path(folder, "generated"))
+        generate(Request(("sensor_msgs",)), catalog, Path(folder, "generated"))
         sys.path.insert(0, f"{folder}/generated/python")
         from rosidl_proto.sensor_msgs.msg import ImageAdapter, ImuAdapter, LaserScanAdapter
 
@@ -308,7 +309,7 @@ def main() -> None:
 
         print(f"\n{'bytes per message':20} {'CDR':>10} {'hash':>10} {'sequential':>10}")
         for name, *sizes in size_rows(
-            Path(folder), sources, [imu, scan, image, PoseArray(poses=[Pose()] * 100)]
+            Path(folder), catalog, [imu, scan, image, PoseArray(poses=[Pose()] * 100)]
         ):
             print(f"{name:20} " + " ".join(f"{size:10}" for size in sizes))
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.generate.python import TYPECODES
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,
     ArrayType,
@@ -23,7 +24,6 @@ from rosidl_adapter_proto.interfaces.model import (
     ValueType,
     integer_range,
 )
-from rosidl_adapter_proto.interfaces.sources import Sources
 
 # NUL ends a C string, so ROS cannot send it.
 _CHARACTERS = st.characters(exclude_categories=["Cs"], exclude_characters="\0")
@@ -33,15 +33,15 @@ _LONGEST_SEQUENCE = 4
 class RosMessages:
     """Strategies for ROS messages: objects of the ROS classes that the adapters name."""
 
-    def __init__(self, sources: Sources, adapters: dict[TypeName, type[TypeAdapter[Any, Any]]]) -> None:
-        self.sources = sources
+    def __init__(self, catalog: Catalog, adapters: dict[TypeName, type[TypeAdapter[Any, Any]]]) -> None:
+        self.catalog = catalog
         self.adapters = adapters
         self._made: dict[TypeName, st.SearchStrategy[Any]] = {}
 
     def message(self, name: TypeName) -> st.SearchStrategy[Any]:
         """Return a strategy for a message."""
         if name not in self._made:
-            model = self.sources.message(name)
+            model = self.catalog.message(name)
             values = st.fixed_dictionaries(
                 {each.name: self.value(each.type) for each in model.fields if each.name != EMPTY_STRUCT_FIELD}
             )
@@ -85,11 +85,11 @@ class RosMessages:
         return st.integers(*integer_range(value_type.name))
 
 
-def message_names(sources: Sources, names: list[TypeName]) -> list[TypeName]:
+def message_names(catalog: Catalog, names: list[TypeName]) -> list[TypeName]:
     """Return every message of some interfaces, those of services and actions included."""
     from rosidl_adapter_proto.interfaces.model import messages
 
     found: list[Message] = []
     for name in names:
-        found += messages(sources.definition(name).interface, events=True)
+        found += messages(catalog.definition(name).interface, events=True)
     return [message.name for message in found]

@@ -63,15 +63,15 @@ def generate_command(
         raise click.UsageError(
             "Missing argument 'WHAT...': name a package, or set `packages` in the configuration."
         )
-    request, sources = find_request(what, include, distro, deps)
+    request, catalog = find_request(what, include, distro, deps)
     options = Options(numbering, lock_file, events, python_root)
     with _progress() as progress:
-        result = generate(request, sources, output, options, check=check, progress=progress)
+        result = generate(request, catalog, output, options, check=check, progress=progress)
     for warning in result.warnings:
         click.echo(f"Warning: {warning}", err=True)
     if verbose:
         for name in result.interfaces:
-            click.echo(f"{name} from {sources.definition(name).file}")
+            click.echo(f"{name} from {catalog.definition(name).file}")
     if check:
         return _report_check(result, output, lock_file)
     if verbose:

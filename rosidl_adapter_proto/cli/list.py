@@ -8,8 +8,8 @@ import click
 
 from rosidl_adapter_proto.cli.options import complete_name, source_options
 from rosidl_adapter_proto.generate.index import installed_packages
-from rosidl_adapter_proto.generate.request import find_sources
-from rosidl_adapter_proto.interfaces.sources import prefixes
+from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.interfaces.find import prefixes
 
 
 @click.command("list")
@@ -20,12 +20,12 @@ def list_command(package: str | None, include: tuple[Path, ...], distro: str | N
 
     A package whose protobuf types and adapters are installed is listed with their place, too.
     """
-    sources = find_sources(include, distro)
+    catalog = find_catalog(include, distro)
     if package is None:
         installed = installed_packages(prefixes())
         rows = []
-        for name in sorted({*sources.packages, *installed}):
-            found = sources.packages.get(name, {})
+        for name in sorted({*catalog.packages, *installed}):
+            found = catalog.packages.get(name, {})
             places = [next(iter(found.values())).origin if found else "no definitions"]
             if name in installed:
                 number = installed[name].generated.interfaces
@@ -34,7 +34,7 @@ def list_command(package: str | None, include: tuple[Path, ...], distro: str | N
     else:
         rows = [
             (str(name), definition.format, definition.file)
-            for name, definition in sources.package(package).items()
+            for name, definition in catalog.package(package).items()
         ]
     widths = [max(len(row[column]) for row in rows) for column in range(2)]
     for first, second, third in rows:

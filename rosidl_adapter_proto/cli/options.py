@@ -10,7 +10,7 @@ import click
 
 from rosidl_adapter_proto.errors import Error
 from rosidl_adapter_proto.generate.configuration import NUMBERINGS
-from rosidl_adapter_proto.generate.request import find_sources
+from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces import store
 from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering
 
@@ -25,11 +25,11 @@ def complete_distro(context: click.Context, parameter: click.Parameter, incomple
 def complete_name(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
     """Return the packages, or behind a slash the types of one, that begin with what was typed."""
     try:
-        sources = find_sources(context.params.get("include") or (), context.params.get("distro"))
+        catalog = find_catalog(context.params.get("include") or (), context.params.get("distro"))
     except Error:
         return []
     package, slash, _ = incomplete.partition("/")
-    names = map(str, sources.packages.get(package, ())) if slash else sources.packages
+    names = map(str, catalog.packages.get(package, ())) if slash else catalog.packages
     return sorted(name for name in names if name.startswith(incomplete))
 
 

@@ -9,7 +9,7 @@ import click
 
 from rosidl_adapter_proto.cli.options import complete_name, schema_options, source_options
 from rosidl_adapter_proto.generate import Options, proto_text
-from rosidl_adapter_proto.generate.request import find_sources
+from rosidl_adapter_proto.generate.request import find_catalog
 
 
 @click.command("show")
@@ -27,11 +27,11 @@ def show_command(
     """Show the definition of TYPE (std_msgs/msg/String) and the .proto made of it, side by side."""
     if "/" not in type_name:
         raise click.UsageError(f"{type_name!r} is not the name of a type, such as std_msgs/msg/String")
-    sources = find_sources(include, distro)
-    definition = sources.definition(sources.full_name(type_name))
-    proto = proto_text(definition.name, sources, Options(numbering, lock_file, events))
+    catalog = find_catalog(include, distro)
+    definition = catalog.definition(catalog.full_name(type_name))
+    proto = proto_text(definition.name, catalog, Options(numbering, lock_file, events))
     click.echo(f"{definition.name} from {definition.file}")
-    click.echo(f"type hash {sources.hash(definition.name)}\n")
+    click.echo(f"type hash {catalog.hash(definition.name)}\n")
     left = definition.text.expandtabs(4).splitlines()
     right = proto.splitlines()
     width = max((len(line) for line in left), default=0)

@@ -24,8 +24,9 @@ from rosidl_adapter_proto.generate.layout import (
 )
 from rosidl_adapter_proto.generate.manifest import digest, is_intact, read_manifest
 from rosidl_adapter_proto.generate.request import Options, Request
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.closure import closure
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import Sources, closure
 from rosidl_adapter_proto.schema.numbering import (
     HashNumbering,
     Numbering,
@@ -71,7 +72,7 @@ class Result:
 
 def generate(
     request: Request,
-    sources: Sources,
+    catalog: Catalog,
     output: Path,
     options: Options = Options(),
     *,
@@ -82,7 +83,7 @@ def generate(
 
     Args:
         request: What to generate.
-        sources: Where definitions come from.
+        catalog: Where definitions come from.
         output: The folder to write; it then holds what this call makes, and nothing that an earlier one made.
         options: How to generate.
         check: Only find out what would change.
@@ -97,28 +98,28 @@ def generate(
     lock_text = _read_lock(options)
     old = read_manifest(output)
     if old is not None and is_intact(output, old):
-        fingerprint = _fingerprint(request, sources, options, lock_text, old.interfaces)
+        fingerprint = _fingerprint(request, catalog, options, lock_text, old.interfaces)
         if fingerprint == old.fingerprint:
             if not check:
                 discard_left_over(output)
             unchanged = Changes((), (), len(old.outputs))
-            return Result(old.interfaces, unchanged, False, _warnings(sources, old.interfaces))
+            return Result(old.interfaces, unchanged, False, _warnings(catalog, old.interfaces))
 
-    names = closure(sources, request.packages, request.types, events=options.events)
+    names = closure(catalog, request.packages, request.types, events=options.events)
     numbering = _numbering(options, lock_text)
-    files = _generate_files(names, request, sources, options, numbering, progress)
+    files = _generate_files(names, request, catalog, options, numbering, progress)
     new_lock_text = numbering.lock_text() if isinstance(numbering, SequentialNumbering) else lock_text
-    fingerprint = _fingerprint(request, sources, options, new_lock_text, names)
+    fingerprint = _fingerprint(request, catalog, options, new_lock_text, names)
     changed = changes(output, files)
     if not check:
         # The lock file comes first: numbers that nothing uses yet do no harm, but used ones that are not kept do.
         if new_lock_text is not None and new_lock_text != lock_text:
             _write_lock(options, lock_text, new_lock_text)
         changed = write(output, make_manifest(fingerprint, names, files), files)
-    return Result(tuple(names), changed, new_lock_text != lock_text, _warnings(sources, names))
+    return Result(tuple(names), changed, new_lock_text != lock_text, _warnings(catalog, names))
 
 
-def check_definitions(request: Request, sources: Sources, options: Options = Options()) -> list[TypeName]:
+def check_definitions(request: Request, catalog: Catalog, options: Options = Options()) -> list[TypeName]:
     """Check all that can be wrong with definitions, and return what the request asks for, dependencies included.
 
     It is quick, since it stops where protoc and files begin: a build may call it before all else.
@@ -128,12 +129,12 @@ def check_definitions(request: Request, sources: Sources, options: Options = Opt
         SchemaError: An interface cannot be mapped to protobuf, or the lock file disagrees.
         GenerateError: The lock file cannot be read, or the name of the Python package is none.
     """
-    names = closure(sources, request.packages, request.types, events=options.events)
-    _proto_files(names, request, sources, options, _numbering(options, _read_lock(options)))
+    names = closure(catalog, request.packages, request.types, events=options.events)
+    _proto_files(names, request, catalog, options, _numbering(options, _read_lock(options)))
     return names
 
 
-def proto_text(name: TypeName, sources: Sources, options: Options = Options()) -> str:
+def proto_text(name: TypeName, catalog: Catalog, options: Options = Options()) -> str:
     """Return the `.proto` file of an interface.
 
     Raises:
@@ -143,15 +144,15 @@ def proto_text(name: TypeName, sources: Sources, options: Options = Options()) -
     from rosidl_adapter_proto.generate.render import render
 
     numbering = _numbering(options, _read_lock(options))
-    interface = sources.definition(name).interface
-    file = proto_file(interface, numbering, sources.definition_name, events=options.events)
+    interface = catalog.definition(name).interface
+    file = proto_file(interface, numbering, catalog.definition_name, events=options.events)
     return render("proto/interface.proto.jinja", file=file)
 
 
 def _generate_files(
     names: list[TypeName],
     request: Request,
-    sources: Sources,
+    catalog: Catalog,
     options: Options,
     numbering: Numbering,
     progress: Progress | None,
@@ -162,11 +163,11 @@ def _generate_files(
     from rosidl_adapter_proto.generate.python import Names, python_modules
     from rosidl_adapter_proto.generate.render import render, render_modules, render_packages
 
-    protos = _proto_files(names, request, sources, options, numbering)
+    protos = _proto_files(names, request, catalog, options, numbering)
     texts = {file.path: render("proto/interface.proto.jinja", file=file) for file in protos}
     wanted = [file for file in protos if _is_wanted(file.source.name, request)]
     descriptors = compile_protos(texts, [file.path for file in wanted])
-    python_names = Names(options.python_root, sources)
+    python_names = Names(options.python_root, catalog)
     modules = [python_modules(file, python_names) for file in wanted]
 
     files = {f"proto/{file.path}": texts[file.path].encode() for file in wanted}
@@ -176,22 +177,22 @@ def _generate_files(
             progress(done, len(modules))
     requested = {*request.packages, *(name.package for name in request.types)}
     files.update(render_packages(modules, options.python_root, requested))
-    resources = generated_packages((file.source.name for file in wanted), sources, options)
+    resources = generated_packages((file.source.name for file in wanted), catalog, options)
     files.update((f"index/{RESOURCE_TYPE}/{name}", each.to_json()) for name, each in resources.items())
     return files
 
 
 def _proto_files(
-    names: Iterable[TypeName], request: Request, sources: Sources, options: Options, numbering: Numbering
+    names: Iterable[TypeName], request: Request, catalog: Catalog, options: Options, numbering: Numbering
 ) -> list[ProtoFile]:
     _check_python_root(options.python_root)
     # What is only referred to is numbered elsewhere. Its numbers make no difference here, and belong into no lock file.
     others = SequentialNumbering.from_lock("", None)
     protos = [
         proto_file(
-            sources.definition(name).interface,
+            catalog.definition(name).interface,
             numbering if _is_wanted(name, request) else others,
-            sources.definition_name,
+            catalog.definition_name,
             events=options.events,
         )
         for name in names
@@ -214,11 +215,11 @@ def _is_wanted(name: TypeName, request: Request) -> bool:
     return request.dependencies or name.package in request.packages or name in request.types
 
 
-def _warnings(sources: Sources, names: Iterable[TypeName]) -> tuple[str, ...]:
+def _warnings(catalog: Catalog, names: Iterable[TypeName]) -> tuple[str, ...]:
     return tuple(
         f"{winner.name} is defined differently by {winner.file} and {loser.file}; "
         f"the first is used, since {winner.origin} comes before {loser.origin}"
-        for winner, loser in sources.shadowed(names)
+        for winner, loser in catalog.shadowed(names)
     )
 
 
@@ -250,7 +251,7 @@ def _write_lock(options: Options, old_text: str | None, new_text: str) -> None:
 
 
 def _fingerprint(
-    request: Request, sources: Sources, options: Options, lock_text: str | None, names: Iterable[TypeName]
+    request: Request, catalog: Catalog, options: Options, lock_text: str | None, names: Iterable[TypeName]
 ) -> str:
     """Return a digest of everything that the generated files depend on.
 
@@ -258,15 +259,15 @@ def _fingerprint(
     these are the same, nothing needs to be parsed.
     """
     names = sorted({*names, *_IN_EVERY_SERVICE})
-    packages = {name.package: sorted(map(str, sources.packages.get(name.package, ()))) for name in names}
-    known = [name for name in names if name in sources.packages.get(name.package, ())]
+    packages = {name.package: sorted(map(str, catalog.packages.get(name.package, ()))) for name in names}
+    known = [name for name in names if name in catalog.packages.get(name.package, ())]
     content = {
         "tool": _tool_digest(),
         "request": [sorted(request.packages), sorted(map(str, request.types)), request.dependencies],
         "options": [options.numbering, options.events, options.python_root],
         "lock": lock_text,
         "packages": packages,
-        "definitions": {str(name): digest(sources.definition(name).text.encode()) for name in known},
+        "definitions": {str(name): digest(catalog.definition(name).text.encode()) for name in known},
     }
     return digest(json.dumps(content).encode())
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.request import Options, Request, find_request, is_path
-from rosidl_adapter_proto.interfaces.sources import Sources
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering, SequentialNumbering
 
 if sys.version_info >= (3, 11):
@@ -75,7 +75,7 @@ class Configuration:
     file: Path
     values: Mapping[str, Any]
 
-    def request(self) -> tuple[Request, Sources, Options]:
+    def request(self) -> tuple[Request, Catalog, Options]:
         """Return what the configuration asks for, where definitions come from, and how to generate.
 
         Raises:
@@ -86,7 +86,7 @@ class Configuration:
         if not values.get("packages"):
             raise RequestError(f"{self.file}: [{SECTION}] names nothing to generate; set `packages`")
         include = map(Path, values.get("include", ()))
-        request, sources = find_request(
+        request, catalog = find_request(
             values["packages"], include, values.get("distro"), values.get("deps", True)
         )
         default = Options()
@@ -96,7 +96,7 @@ class Configuration:
             values.get("events", default.events),
             values.get("python-root", default.python_root),
         )
-        return request, sources, options
+        return request, catalog, options
 
 
 def find_configuration(folder: Path) -> Configuration | None:

@@ -14,8 +14,8 @@ from pathlib import Path
 from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate.manifest import digest
 from rosidl_adapter_proto.generate.request import Options
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import Sources
 
 SHARED_FOLDERS = {"proto": "share", "index": "share/ament_index/resource_index"}
 """Where the folders of an output folder that are not Python's go in a prefix."""
@@ -56,7 +56,7 @@ class InstalledPackage:
 
 
 def generated_packages(
-    names: Iterable[TypeName], sources: Sources, options: Options
+    names: Iterable[TypeName], catalog: Catalog, options: Options
 ) -> dict[str, GeneratedPackage]:
     """Return what is generated of each package when `names` are."""
     by_package: dict[str, list[TypeName]] = {}
@@ -66,7 +66,7 @@ def generated_packages(
         package: GeneratedPackage(
             len(interfaces),
             digest(
-                "".join(f"{each}\n{_essence(sources.definition(each).text)}" for each in interfaces).encode()
+                "".join(f"{each}\n{_essence(catalog.definition(each).text)}" for each in interfaces).encode()
             ),
             options.numbering,
             options.events,

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.errors import SchemaError
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.description import field_type_description
 from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,
@@ -33,7 +34,6 @@ from rosidl_adapter_proto.interfaces.model import (
     references,
     value_type,
 )
-from rosidl_adapter_proto.interfaces.sources import Sources
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoFile, ProtoMessage
 from rosidl_adapter_proto.schema.typemap import proto_full_name
 
@@ -217,11 +217,11 @@ class Names:
 
     Attributes:
         root: The namespace package at the top, such as `rosidl_proto`.
-        sources: Knows every type.
+        catalog: Knows every type.
     """
 
     root: str
-    sources: Sources
+    catalog: Catalog
 
     def package(self, name: TypeName) -> str:
         """Return the Python package of a type."""
@@ -229,12 +229,12 @@ class Names:
 
     def module(self, name: TypeName, suffix: str) -> str:
         """Return the module of the interface that a type is part of."""
-        owner = self.sources.definition_name(name)
+        owner = self.catalog.definition_name(name)
         return f"{self.package(owner)}.{owner.name}_{suffix}"
 
     def adapter(self, name: TypeName) -> str:
         """Return the class name of an adapter; not that of a message which happens to be called the same."""
-        package = self.sources.package(name.package)
+        package = self.catalog.package(name.package)
         class_name = f"{name.name}Adapter"
         while TypeName(name.package, name.namespace, class_name) in package:
             class_name += "_"
@@ -266,7 +266,7 @@ def python_modules(file: ProtoFile, names: Names) -> PythonModules:
         adapter_imports=tuple(
             (names.module(name, "adapter"), names.adapter(name), local_name)
             for name, local_name in local.items()
-            if names.sources.definition_name(name) != source.name
+            if names.catalog.definition_name(name) != source.name
         ),
         custom_names=tuple(each.name for each in file.messages),
         messages=adapters,
@@ -288,7 +288,7 @@ def _message_adapter(
         custom=proto.name,
         custom_full_name=proto_full_name(message.name),
         type_name=str(message.name),
-        type_hash=names.sources.hash(message.name),
+        type_hash=names.catalog.hash(message.name),
         ros_class=_ros_class(message.name, interface),
         comment=_docstring_lines(message.comment),
         constants=tuple(
@@ -359,7 +359,7 @@ def _groups(interface: Interface, names: Names) -> tuple[GroupAdapter, ...]:
             base="ActionAdapter",
             parameters=(interface.goal.name.name, interface.result.name.name, interface.feedback.name.name),
             type_name=str(interface.name),
-            type_hash=names.sources.hash(interface.name),
+            type_hash=names.catalog.hash(interface.name),
             ros_class=_ros_class(interface.name, interface),
             parts=tuple((part, names.adapter(name)) for part, name in parts.items()),
         ),
@@ -372,7 +372,7 @@ def _service_group(service: Service, interface: Interface, names: Names) -> Grou
         base="ServiceAdapter",
         parameters=(service.request.name.name, service.response.name.name),
         type_name=str(service.name),
-        type_hash=names.sources.hash(service.name),
+        type_hash=names.catalog.hash(service.name),
         ros_class=_ros_class(service.name, interface),
         parts=(
             ("request", names.adapter(service.request.name)),
@@ -604,7 +604,7 @@ def _has_defaults(message: Message, names: Names) -> bool:
         return True
     # A sequence is empty by default, whatever its elements are.
     return any(
-        _has_defaults(names.sources.message(name), names)
+        _has_defaults(names.catalog.message(name), names)
         for field, name in references(message)
         if not isinstance(field.type, SequenceType)
     )
@@ -657,7 +657,7 @@ def _stub_field(proto: ProtoField, interface: Interface, names: Names) -> StubFi
     element = value_type(proto.source.type)
     if isinstance(element, TypeName):
         plain = element.name
-        if names.sources.definition_name(element) != interface.name:
+        if names.catalog.definition_name(element) != interface.name:
             plain = f"{_stub_alias(names.module(element, 'pb2'))}.{element.name}"
         read = f"_containers.RepeatedCompositeFieldContainer[{plain}]" if proto.repeated else plain
         argument = f"_typing.Iterable[{plain}]" if proto.repeated else plain

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rosidl_adapter_proto.errors import RequestError
-from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import (
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import (
     SUFFIXES,
     Source,
-    Sources,
     file_source,
     folder_source,
     prefix_sources,
     store_source,
 )
+from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME
 
 
@@ -52,15 +52,15 @@ class Options:
     python_root: str = "rosidl_proto"
 
 
-def find_sources(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Sources:
+def find_catalog(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Catalog:
     """Return every source in the order they win: `first`, included folders, ROS installations, the store."""
     folders = [folder_source(_existing(path)) for path in include]
-    return Sources((*first, *folders, *prefix_sources(), store_source(distro)))
+    return Catalog((*first, *folders, *prefix_sources(), store_source(distro)))
 
 
 def find_request(
     what: Sequence[str], include: Iterable[Path], distro: str | None, dependencies: bool
-) -> tuple[Request, Sources]:
+) -> tuple[Request, Catalog]:
     """Return what the arguments of a command ask for, and where definitions come from.
 
     Args:
@@ -85,18 +85,18 @@ def find_request(
             packages += source.packages
         else:
             names.append(text)
-    sources = find_sources(include, distro, given)
+    catalog = find_catalog(include, distro, given)
     for text in names:
-        if text not in sources.packages and Path(text).is_dir():
+        if text not in catalog.packages and Path(text).is_dir():
             source = folder_source(Path(text))
-            sources = Sources((source, *sources.sources))
+            catalog = Catalog((source, *catalog.sources))
             packages += source.packages
         elif "/" in text:
-            types.append(sources.full_name(text))
+            types.append(catalog.full_name(text))
         else:
-            sources.package(text)
+            catalog.package(text)
             packages.append(text)
-    return Request(tuple(packages), tuple(types), dependencies), sources
+    return Request(tuple(packages), tuple(types), dependencies), catalog
 
 
 def is_path(text: str) -> bool:

@@ -28,8 +28,10 @@ from rosidl_adapter_proto.generate.index import (
 )
 from rosidl_adapter_proto.generate.layout import alone_in, replace_file
 from rosidl_adapter_proto.generate.manifest import read_manifest
-from rosidl_adapter_proto.generate.request import find_sources
-from rosidl_adapter_proto.interfaces.sources import Source, Sources, closure, interface_source
+from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.closure import closure
+from rosidl_adapter_proto.interfaces.find import Source, interface_source
 from rosidl_adapter_proto.schema.numbering import SequentialNumbering
 
 PACKAGE_FOLDER = "package"
@@ -70,13 +72,13 @@ class Build:
         """
         return interface_source(self.package, self.interfaces)
 
-    def sources(self) -> Sources:
+    def catalog(self) -> Catalog:
         """Return where definitions come from: the package, its dependencies, ROS, and the embedded store.
 
         Raises:
             DefinitionError: An interface is not in a folder msg, srv or action.
         """
-        return find_sources(self.dependencies, None, [self.own_source()])
+        return find_catalog(self.dependencies, None, [self.own_source()])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -116,7 +118,7 @@ def check(build: Build) -> None:
     Raises:
         Error: Something is wrong with one.
     """
-    check_definitions(Request((build.package,), dependencies=False), build.sources(), build.options)
+    check_definitions(Request((build.package,), dependencies=False), build.catalog(), build.options)
 
 
 def generate_package(build: Build) -> None:
@@ -125,20 +127,20 @@ def generate_package(build: Build) -> None:
     Raises:
         Error: Something is wrong with a definition, or files cannot be written.
     """
-    sources = build.sources()
+    catalog = build.catalog()
     own = Request((build.package,), dependencies=False)
-    result = generate(own, sources, build.output / PACKAGE_FOLDER, build.options)
+    result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options)
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
     needed = {name.package for name in result.interfaces} - {build.package}
-    missing = tuple(sorted(needed - _provided(build, sources)))
+    missing = tuple(sorted(needed - _provided(build, catalog)))
     folder = build.output / DEPENDENCIES_FOLDER
     if missing or read_manifest(folder) is not None:
-        generate(Request(missing, dependencies=False), sources, folder, build.options)
+        generate(Request(missing, dependencies=False), catalog, folder, build.options)
     _write_depfile(build)
 
 
-def _provided(build: Build, sources: Sources) -> set[str]:
+def _provided(build: Build, catalog: Catalog) -> set[str]:
     """Return the packages that come with the dependencies of a package.
 
     A dependency that was built with this hook, from the same definitions and in the same way, has seen to everything
@@ -151,8 +153,8 @@ def _provided(build: Build, sources: Sources) -> set[str]:
             installed = installed_package(folder.parents[1], name)
         except GenerateError:
             continue  # another version of this program has made it: it is made again, here
-        if installed == generated_packages(sources.package(name), sources, build.options)[name]:
-            provided.update(each.package for each in closure(sources, [name], events=build.options.events))
+        if installed == generated_packages(catalog.package(name), catalog, build.options)[name]:
+            provided.update(each.package for each in closure(catalog, [name], events=build.options.events))
     return provided
 
 

@@ -53,11 +53,11 @@ def generate_project(configuration: Configuration, output: Path) -> GeneratedPro
     Raises:
         Error: The configuration or a definition is wrong, or files cannot be written.
     """
-    request, sources, options = configuration.request()
+    request, catalog, options = configuration.request()
     # Other projects may install the same package, and Python takes all of it from one of them: so it comes whole.
     packages = dict.fromkeys((*request.packages, *(name.package for name in request.types)))
     whole = Request(tuple(packages), dependencies=request.dependencies)
-    result = generate(whole, sources, output, options)
+    result = generate(whole, catalog, output, options)
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
     return GeneratedProject(output, options.python_root)

@@ -8,8 +8,8 @@ from rosidl_cli.command.generate.extensions import GenerateCommandExtension
 
 from rosidl_adapter_proto.generate import Request, generate
 from rosidl_adapter_proto.generate.manifest import read_manifest
-from rosidl_adapter_proto.generate.request import find_sources
-from rosidl_adapter_proto.interfaces.sources import interface_source
+from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.interfaces.find import interface_source
 
 
 class GenerateProto(GenerateCommandExtension):  # type: ignore[misc, unused-ignore]
@@ -40,7 +40,7 @@ class GenerateProto(GenerateCommandExtension):  # type: ignore[misc, unused-igno
         """
         own = interface_source(package_name, interface_files)
         names = tuple(own.packages[package_name])
-        sources = find_sources(map(Path, include_paths), None, [own])
-        generate(Request(types=names), sources, output_path)
+        catalog = find_catalog(map(Path, include_paths), None, [own])
+        generate(Request(types=names), catalog, output_path)
         manifest = read_manifest(output_path)
         return [str(output_path / path) for path in manifest.outputs] if manifest else []

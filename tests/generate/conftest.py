@@ -18,8 +18,9 @@ os.environ.setdefault("ROS_PYTHON_CHECK_FIELDS", "1")
 
 from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.generate import Options, Request, generate
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import Sources, prefix_sources, store_source
 from tests.strategies import RosMessages, message_names
 
 
@@ -28,7 +29,7 @@ class Generated:
     """A generated folder whose Python packages can be imported."""
 
     folder: Path
-    sources: Sources
+    catalog: Catalog
     interfaces: tuple[TypeName, ...]
 
     def adapter(self, name: TypeName) -> Any:
@@ -38,25 +39,25 @@ class Generated:
 
     def messages(self) -> list[TypeName]:
         """Return every message, those of services and actions included."""
-        return message_names(self.sources, list(self.interfaces))
+        return message_names(self.catalog, list(self.interfaces))
 
 
 @pytest.fixture(scope="session")
 def ros_install(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Generated]:
     """All packages of the ROS installation that have Python classes."""
     pytest.importorskip("rclpy", reason="needs a ROS installation: pip install '.[ros]'")
-    sources = Sources((*prefix_sources(), store_source()))
+    catalog = Catalog((*prefix_sources(), store_source()))
     packages = [
         name
-        for source in sources.sources
+        for source in catalog.sources
         if source.origin.startswith("ROS prefix")
         for name in source.packages
         if (spec := importlib.util.find_spec(name)) and spec.origin
     ]
     folder = tmp_path_factory.mktemp("ros_install")
-    result = generate(Request(tuple(packages)), sources, folder, Options(events=True))
+    result = generate(Request(tuple(packages)), catalog, folder, Options(events=True))
     sys.path.insert(0, str(folder / "python"))
-    yield Generated(folder, sources, result.interfaces)
+    yield Generated(folder, catalog, result.interfaces)
     sys.path.remove(str(folder / "python"))
 
 
@@ -66,4 +67,4 @@ def ros_messages(ros_install: Generated) -> RosMessages:
     adapters: dict[TypeName, type[TypeAdapter[Any, Any]]] = {
         name: ros_install.adapter(name) for name in ros_install.messages()
     }
-    return RosMessages(ros_install.sources, adapters)
+    return RosMessages(ros_install.catalog, adapters)

@@ -21,7 +21,8 @@ import pytest
 from rosidl_adapter_proto.adapter import RosNotFoundError, add_descriptor_file
 from rosidl_adapter_proto.errors import ConversionError, GenerateError, SchemaError
 from rosidl_adapter_proto.generate import Options, Request, generate
-from rosidl_adapter_proto.interfaces.sources import Sources, folder_source, store_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 
 # protoc before 26 has an option for fields with the same JSON name, but does not heed it in proto3.
 PROTOC_TAKES_JSON_CONFLICTS = tuple(map(int, version("grpcio-tools").split(".")[:2])) >= (1, 66)
@@ -86,8 +87,8 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespac
         file = root / "things" / path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, encoding="utf-8")
-    sources = Sources((folder_source(root / "things"), store_source()))
-    generate(Request(("things",)), sources, root / "out", Options(python_root="things_root"))
+    catalog = Catalog((folder_source(root / "things"), store_source()))
+    generate(Request(("things",)), catalog, root / "out", Options(python_root="things_root"))
     sys.path.insert(0, str(root / "out/python"))
     modules = {
         name: importlib.import_module(f"things_root.things.{name}") for name in ("msg", "srv", "action")
@@ -341,7 +342,7 @@ def test_python_roots_that_cannot_be(name: str, tmp_path: Path) -> None:
         GenerateError, match=rf"'{name}' (is|cannot be) the name of a(nother)? Python package"
     ):
         generate(
-            Request(("std_msgs",)), Sources((store_source(),)), tmp_path / "out", Options(python_root=name)
+            Request(("std_msgs",)), Catalog((store_source(),)), tmp_path / "out", Options(python_root=name)
         )
 
 

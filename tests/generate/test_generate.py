@@ -20,8 +20,9 @@ from rosidl_adapter_proto import generate as generate_module
 from rosidl_adapter_proto.errors import DefinitionError, GenerateError, SchemaError
 from rosidl_adapter_proto.generate import Options, Request, Result, generate, layout, protoc
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import Sources, folder_source, store_source
 from tests.folders import content, times, write_package
 
 POINT = "float64 x\nfloat64 y\n"
@@ -79,8 +80,8 @@ def run(
     return generate(request, find(source), output, options, check=check)
 
 
-def find(source: Path) -> Sources:
-    return Sources((folder_source(source), STORE))
+def find(source: Path) -> Catalog:
+    return Catalog((folder_source(source), STORE))
 
 
 def modules(package: str, name: str, root: str = "rosidl_proto") -> set[str]:
@@ -198,16 +199,17 @@ RUN = """
 import sys
 from pathlib import Path
 from rosidl_adapter_proto.generate import Request, generate
-from rosidl_adapter_proto.interfaces.sources import Sources, folder_source, store_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 source, output, package, *distributions = sys.argv[1:]
-sources = Sources((folder_source(Path(source)), *map(store_source, distributions)))
-print(generate(Request((package,)), sources, Path(output)).is_stale)
+catalog = Catalog((folder_source(Path(source)), *map(store_source, distributions)))
+print(generate(Request((package,)), catalog, Path(output)).is_stale)
 print([name for name in ("jinja2", "black", "grpc_tools", "lark", "rosbags", "click") if name in sys.modules])
 """
 
 
 def test_slow_libraries_are_not_loaded_when_nothing_is_to_be_done(source: Path, output: Path) -> None:
-    generate(Request(("base_msgs",)), Sources((folder_source(source),)), output)
+    generate(Request(("base_msgs",)), Catalog((folder_source(source),)), output)
 
     command = [sys.executable, "-c", RUN, str(source), str(output), "base_msgs"]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "False\n[]\n"
@@ -523,9 +525,9 @@ def test_interrupted_while_generating(source: Path, generated: Path) -> None:
     def interrupt(done: int, total: int) -> None:
         raise KeyboardInterrupt
 
-    request, sources = Request(("my_msgs",)), find(source)
+    request, catalog = Request(("my_msgs",)), find(source)
     with pytest.raises(KeyboardInterrupt):
-        generate(request, sources, generated, progress=interrupt)
+        generate(request, catalog, generated, progress=interrupt)
 
     assert content(generated) == before
 
@@ -558,21 +560,21 @@ def test_two_runs_at_the_same_time(source: Path, output: Path) -> None:
 
 def test_progress(source: Path, output: Path) -> None:
     calls: list[tuple[int, int]] = []
-    request, sources = Request(("my_msgs",)), find(source)
+    request, catalog = Request(("my_msgs",)), find(source)
 
-    generate(request, sources, output, progress=lambda done, total: calls.append((done, total)))
+    generate(request, catalog, output, progress=lambda done, total: calls.append((done, total)))
     assert calls == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
-    generate(request, sources, output, progress=lambda done, total: calls.append((done, total)))
+    generate(request, catalog, output, progress=lambda done, total: calls.append((done, total)))
     assert len(calls) == 4
 
 
 def test_two_sources_define_a_type_differently(source: Path, output: Path, tmp_path: Path) -> None:
     overlay = write_package(tmp_path / "overlay" / "base_msgs", {"msg/Point.msg": "float32 x\n"}).parent
-    sources = Sources((folder_source(overlay), folder_source(source), STORE))
+    catalog = Catalog((folder_source(overlay), folder_source(source), STORE))
 
     for _ in range(2):  # the second time, nothing is to be done
-        result = generate(Request(("my_msgs",)), sources, output)
+        result = generate(Request(("my_msgs",)), catalog, output)
 
         assert result.warnings == (
             f"base_msgs/msg/Point is defined differently by {overlay}/base_msgs/msg/Point.msg and "

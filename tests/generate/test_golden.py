@@ -9,15 +9,16 @@ import pytest
 
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME
-from rosidl_adapter_proto.interfaces.sources import Sources, folder_source, store_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 from tests.generate.test_adapter import PROTOC_TAKES_JSON_CONFLICTS
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 
 
 def generated(folder: Path, options: Options) -> dict[str, str]:
-    sources = Sources((folder_source(GOLDEN / "sample_msgs"), store_source("kilted")))
-    generate(Request(("sample_msgs",), dependencies=False), sources, folder, options)
+    catalog = Catalog((folder_source(GOLDEN / "sample_msgs"), store_source("kilted")))
+    generate(Request(("sample_msgs",), dependencies=False), catalog, folder, options)
     files = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*") if file.is_file()}
     del files[MANIFEST_NAME]
     return {path: file.read_text(encoding="utf-8") for path, file in sorted(files.items())}

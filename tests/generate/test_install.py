@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from rosidl_adapter_proto.generate import Request, generate
-from rosidl_adapter_proto.interfaces.sources import Sources, folder_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import folder_source
 from tests.folders import content, write_package
 
 CHECKOUT = Path(__file__).parents[2]
@@ -36,7 +37,7 @@ def test_pip_install(ignored: bool, tmp_path: Path) -> None:
     write_package(source / "base_msgs", {"msg/Point.msg": "float64 x\n"})
     write_package(source / "my_msgs", {"msg/Place.msg": "base_msgs/Point position\nstring name\n"})
     output = tmp_path / "generated"
-    generate(Request(("my_msgs",)), Sources((folder_source(source),)), output)
+    generate(Request(("my_msgs",)), Catalog((folder_source(source),)), output)
     if ignored:
         if shutil.which("git") is None:
             pytest.skip("needs git")

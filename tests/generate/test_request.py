@@ -8,8 +8,8 @@ import pytest
 
 from rosidl_adapter_proto.errors import DefinitionError, RequestError
 from rosidl_adapter_proto.generate.request import find_request, is_path
+from rosidl_adapter_proto.interfaces.closure import closure
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.interfaces.sources import closure
 from tests.folders import write_package
 
 

@@ -13,7 +13,8 @@ import pytest
 
 from rosidl_adapter_proto.generate import Request, generate
 from rosidl_adapter_proto.interfaces import store
-from rosidl_adapter_proto.interfaces.sources import Sources, store_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import store_source
 
 # Converts a message of each type that is made and read by the rosbags library, which knows nothing of us.
 PROGRAM = """
@@ -82,7 +83,7 @@ print(len(types.fielddefs))
 @pytest.mark.parametrize("distribution", store.distributions())
 def test_every_distribution(distribution: str, tmp_path: Path) -> None:
     source = store_source(distribution)
-    result = generate(Request(tuple(source.packages)), Sources((source,)), tmp_path / "out")
+    result = generate(Request(tuple(source.packages)), Catalog((source,)), tmp_path / "out")
     checkout = Path(__file__).parents[2]
     environment = {"PYTHONPATH": f"{tmp_path / 'out/python'}:{checkout}"}
     process = subprocess.run(

@@ -5,12 +5,14 @@ from pathlib import Path
 
 import pytest
 
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.description import (
     describe,
     field_type_description,
     structs,
     type_hash,
 )
+from rosidl_adapter_proto.interfaces.find import prefix_sources
 from rosidl_adapter_proto.interfaces.model import (
     Action,
     ArrayType,
@@ -23,15 +25,14 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
 )
-from rosidl_adapter_proto.interfaces.sources import Sources, prefix_sources
 from tests import oracle
 
 INSTALLED = oracle.installed_definitions(".json")
 
 
 @pytest.fixture(scope="module")
-def ros() -> Sources:
-    return Sources(tuple(prefix_sources()))
+def ros() -> Catalog:
+    return Catalog(tuple(prefix_sources()))
 
 
 def test_there_are_installed_descriptions(ros_prefix: Path) -> None:
@@ -40,7 +41,7 @@ def test_there_are_installed_descriptions(ros_prefix: Path) -> None:
 
 
 @pytest.mark.parametrize("path", INSTALLED, ids=lambda path: str(oracle.type_name(path)))
-def test_installed_descriptions_and_hashes(path: Path, ros: Sources) -> None:
+def test_installed_descriptions_and_hashes(path: Path, ros: Catalog) -> None:
     name = oracle.type_name(path)
     installed = json.loads(path.read_text("utf-8"))
     hashes = {each["type_name"]: each["hash_string"] for each in installed["type_hashes"]}

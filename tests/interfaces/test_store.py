@@ -4,6 +4,9 @@ import pytest
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces import store
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.closure import closure
+from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 from rosidl_adapter_proto.interfaces.model import (
     ArrayType,
     BasicType,
@@ -13,7 +16,6 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
 )
-from rosidl_adapter_proto.interfaces.sources import Sources, closure, prefix_sources, store_source
 
 DISTRIBUTIONS = (
     *("noetic", "dashing", "eloquent", "foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical"),
@@ -43,19 +45,19 @@ def test_distributions() -> None:
 
 @pytest.mark.parametrize("distribution", store.distributions())
 def test_every_definition_is_read(distribution: str) -> None:
-    sources = Sources((store_source(distribution),))
-    for package in sources.packages.values():
+    catalog = Catalog((store_source(distribution),))
+    for package in catalog.packages.values():
         for name, definition in package.items():
             assert isinstance(definition.interface, Message)
             assert definition.interface.name == name
-    order = closure(sources, sources.packages)
+    order = closure(catalog, catalog.packages)
     assert len(order) == len(set(order)) > 100
-    assert set(order) == {name for package in sources.packages.values() for name in package}
+    assert set(order) == {name for package in catalog.packages.values() for name in package}
 
 
 @pytest.mark.parametrize("distribution", CHANGED_SINCE)
 def test_types_equal_those_of_ros(distribution: str, ros_prefix: object) -> None:
-    ros, embedded = Sources(tuple(prefix_sources())), Sources((store_source(distribution),))
+    ros, embedded = Catalog(tuple(prefix_sources())), Catalog((store_source(distribution),))
     common = [
         name
         for package in embedded.packages.values()
@@ -113,12 +115,12 @@ def test_definitions(
     distribution: str, name: str, fields: tuple[Field, ...], constants: tuple[Constant, ...]
 ) -> None:
     type_name = TypeName.parse(name)
-    assert Sources((store_source(distribution),)).message(type_name) == Message(type_name, fields, constants)
+    assert Catalog((store_source(distribution),)).message(type_name) == Message(type_name, fields, constants)
 
 
 def test_constants() -> None:
-    sources = Sources((store_source("kilted"),))
-    constants = sources.message(TypeName("diagnostic_msgs", "msg", "DiagnosticStatus")).constants
+    catalog = Catalog((store_source("kilted"),))
+    constants = catalog.message(TypeName("diagnostic_msgs", "msg", "DiagnosticStatus")).constants
     assert constants == tuple(
         Constant(name, BasicType("octet"), value)
         for value, name in enumerate(("OK", "WARN", "ERROR", "STALE"))

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from rosidl_adapter_proto.generate import Options, Request, generate
-from rosidl_adapter_proto.interfaces.sources import Sources, prefix_sources, store_source
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 from tests.ros.support import Peer, Spinning, reserve_domain
 
 PACKAGES = (
@@ -30,9 +31,9 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with the generated packages, which can be imported."""
     pytest.importorskip("rclpy", reason="needs rclpy: pip install '.[ros]', or source a ROS 2 installation")
     output = tmp_path_factory.mktemp("generated")
-    sources = Sources((*prefix_sources(), store_source()))
+    catalog = Catalog((*prefix_sources(), store_source()))
     # With the same options as in tests/generate, since one process can hold only one version of a .proto file.
-    generate(Request(PACKAGES), sources, output, Options(events=True))
+    generate(Request(PACKAGES), catalog, output, Options(events=True))
     folder = output / "python"
     sys.path.insert(0, str(folder))
     yield folder

@@ -9,6 +9,9 @@ from typing import Any
 import pytest
 
 from rosidl_adapter_proto.errors import SchemaError
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.closure import closure
+from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 from rosidl_adapter_proto.interfaces.model import (
     Action,
     ArrayType,
@@ -25,7 +28,6 @@ from rosidl_adapter_proto.interfaces.model import (
     Value,
 )
 from rosidl_adapter_proto.interfaces.msg import parse_action, parse_msg, parse_srv
-from rosidl_adapter_proto.interfaces.sources import Sources, closure, prefix_sources, store_source
 from rosidl_adapter_proto.schema.numbering import (
     HashNumbering,
     Numbering,
@@ -88,25 +90,25 @@ def reference_facts(file: ProtoFile) -> Iterator[tuple[str, dict[str, Any]]]:
         yield f"{file.package}.{file.service.name}", {"file": file.path, "rpcs": rpcs}
 
 
-def mapped_facts(sources: Sources) -> dict[str, dict[str, Any]]:
-    packages = {each.partition(".")[0] for each in REFERENCE} & set(sources.packages)
+def mapped_facts(catalog: Catalog) -> dict[str, dict[str, Any]]:
+    packages = {each.partition(".")[0] for each in REFERENCE} & set(catalog.packages)
     return {
         name: found
-        for each in closure(sources, sorted(packages))
+        for each in closure(catalog, sorted(packages))
         for name, found in reference_facts(
-            proto_file(sources.definition(each).interface, HashNumbering(), sources.definition_name)
+            proto_file(catalog.definition(each).interface, HashNumbering(), catalog.definition_name)
         )
     }
 
 
 def test_the_reference_is_met(ros_prefix: Path) -> None:
-    found = mapped_facts(Sources(tuple(prefix_sources())))
+    found = mapped_facts(Catalog(tuple(prefix_sources())))
     assert REFERENCE.keys() <= found.keys()
     assert {name: found[name] for name in REFERENCE} == REFERENCE
 
 
 def test_the_reference_is_met_by_the_store() -> None:
-    found = mapped_facts(Sources((store_source("kilted"),)))
+    found = mapped_facts(Catalog((store_source("kilted"),)))
     common = REFERENCE.keys() & found.keys()
     assert len(common) > 30
     assert {name: found[name] for name in common} == {name: REFERENCE[name] for name in common}
@@ -285,10 +287,10 @@ def test_files_whose_names_differ() -> None:
 
 
 def test_names_of_everything_that_is_installed(ros_prefix: Path) -> None:
-    sources = Sources(tuple(prefix_sources()))
+    catalog = Catalog(tuple(prefix_sources()))
     files = [
-        proto_file(sources.definition(each).interface, HashNumbering(), sources.definition_name, events=True)
-        for each in closure(sources, sources.packages, events=True)
+        proto_file(catalog.definition(each).interface, HashNumbering(), catalog.definition_name, events=True)
+        for each in closure(catalog, catalog.packages, events=True)
     ]
     check_names(files)
     paths = [each.path for each in files]

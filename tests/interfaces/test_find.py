@@ -8,15 +8,10 @@ import pytest
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces import store
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.closure import closure
+from rosidl_adapter_proto.interfaces.find import file_source, folder_source, prefix_sources, store_source
 from rosidl_adapter_proto.interfaces.model import Action, Message, Service, TypeName
-from rosidl_adapter_proto.interfaces.sources import (
-    Sources,
-    closure,
-    file_source,
-    folder_source,
-    prefix_sources,
-    store_source,
-)
 
 SERVICE, ACTION = "int8 a\n---\nint8 b\n", "int8 a\n---\nint8 b\n---\nint8 c\n"
 
@@ -29,8 +24,8 @@ def write(folder: Path, files: Mapping[str, str]) -> Path:
     return folder
 
 
-def read(folder: Path, files: Mapping[str, str]) -> Sources:
-    return Sources((folder_source(write(folder, files)),))
+def read(folder: Path, files: Mapping[str, str]) -> Catalog:
+    return Catalog((folder_source(write(folder, files)),))
 
 
 def name(text: str) -> TypeName:
@@ -118,10 +113,10 @@ def test_a_msg_wins_over_the_idl_made_from_it(tmp_path: Path) -> None:
 
 
 def test_what_a_definition_says(tmp_path: Path) -> None:
-    sources = read(tmp_path, {"a/msg/A.msg": "int8 x", "a/srv/B.srv": SERVICE, "a/action/C.action": ACTION})
+    catalog = read(tmp_path, {"a/msg/A.msg": "int8 x", "a/srv/B.srv": SERVICE, "a/action/C.action": ACTION})
     kinds = {"a/msg/A": Message, "a/srv/B": Service, "a/action/C": Action}
     for type_name, kind in kinds.items():
-        definition = sources.definition(name(type_name))
+        definition = catalog.definition(name(type_name))
         assert isinstance(definition.interface, kind)
         assert definition.interface.name == definition.name == name(type_name)
         assert definition.origin == str(tmp_path)
@@ -133,8 +128,8 @@ def test_what_a_definition_says(tmp_path: Path) -> None:
 def test_a_byte_order_mark_is_no_part_of_the_definition(suffix: str, tmp_path: Path) -> None:
     # ROS 2 itself refuses such a .msg.
     text = {".msg": "int32 x", ".idl": message_idl("a/msg/A", "long x;")}[suffix]
-    sources = read(tmp_path, {f"a/msg/A{suffix}": "\ufeff" + text})
-    assert [each.name for each in sources.message(name("a/msg/A")).fields] == ["x"]
+    catalog = read(tmp_path, {f"a/msg/A{suffix}": "\ufeff" + text})
+    assert [each.name for each in catalog.message(name("a/msg/A")).fields] == ["x"]
 
 
 @pytest.mark.parametrize(
@@ -178,22 +173,22 @@ def test_a_definition_that_is_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_definition_that_is_gone(tmp_path: Path) -> None:
-    sources = read(tmp_path, {"a/msg/A.msg": ""})
+    catalog = read(tmp_path, {"a/msg/A.msg": ""})
     (tmp_path / "a/msg/A.msg").unlink()
-    error = error_of(sources.message, name("a/msg/A"))
+    error = error_of(catalog.message, name("a/msg/A"))
     assert error == f"cannot read {tmp_path}/a/msg/A.msg: No such file or directory"
 
 
 def test_a_definition_that_is_not_utf_8(tmp_path: Path) -> None:
-    sources = read(tmp_path, {"a/msg/A.msg": ""})
+    catalog = read(tmp_path, {"a/msg/A.msg": ""})
     (tmp_path / "a/msg/A.msg").write_bytes(b"int8 a\nint8 b # gr\xfcn\n")
-    error = error_of(sources.message, name("a/msg/A"))
+    error = error_of(catalog.message, name("a/msg/A"))
     assert error == f"{tmp_path}/a/msg/A.msg:2: byte 0xfc is not valid UTF-8; save the file as UTF-8"
 
 
 def test_a_definition_with_a_mistake(tmp_path: Path) -> None:
-    sources = read(tmp_path, {"a/msg/A.msg": "int8 a\nint9 b"})
-    assert error_of(sources.message, name("a/msg/A")).startswith(f"{tmp_path}/a/msg/A.msg:2:1: 'int9' ")
+    catalog = read(tmp_path, {"a/msg/A.msg": "int8 a\nint9 b"})
+    assert error_of(catalog.message, name("a/msg/A")).startswith(f"{tmp_path}/a/msg/A.msg:2:1: 'int9' ")
 
 
 # Single files
@@ -216,7 +211,7 @@ def test_files(path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_file_wins_over_its_other_format(tmp_path: Path) -> None:
     write(tmp_path, {"a/msg/A.msg": "int8 x", "a/msg/A.idl": message_idl("a/msg/A", "long y;")})
     source, type_name = file_source(tmp_path / "a/msg/A.idl")
-    assert [each.name for each in Sources((source,)).message(type_name).fields] == ["y"]
+    assert [each.name for each in Catalog((source,)).message(type_name).fields] == ["y"]
 
 
 def test_a_file_of_a_package_with_a_manifest(tmp_path: Path) -> None:
@@ -256,8 +251,8 @@ def test_prefixes_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(sys, "prefix", str(python))
     found = prefix_sources()
     assert [each.origin for each in found] == [f"ROS prefix {each}" for each in (overlay, underlay, python)]
-    sources = Sources(tuple(found))
-    fields = {each: sources.message(name(f"{each}/msg/A")).fields[0].name for each in "abc"}
+    catalog = Catalog(tuple(found))
+    fields = {each: catalog.message(name(f"{each}/msg/A")).fields[0].name for each in "abc"}
     assert fields == {"a": "a", "b": "b", "c": "c"}
 
 
@@ -274,11 +269,11 @@ def test_the_first_source_provides_the_whole_package(tmp_path: Path) -> None:
     second = folder_source(
         write(tmp_path / "2", {"a/msg/A.msg": "int8 second", "a/msg/B.msg": "", "b/msg/B.msg": ""})
     )
-    sources = Sources((first, second))
-    assert list(sources.package("a")) == [name("a/msg/A")]
-    assert sources.message(name("a/msg/A")).fields[0].name == "first"
-    assert sources.definition(name("b/msg/B")).origin == str(tmp_path / "2")
-    assert error_of(sources.definition, name("a/msg/B")) == (
+    catalog = Catalog((first, second))
+    assert list(catalog.package("a")) == [name("a/msg/A")]
+    assert catalog.message(name("a/msg/A")).fields[0].name == "first"
+    assert catalog.definition(name("b/msg/B")).origin == str(tmp_path / "2")
+    assert error_of(catalog.definition, name("a/msg/B")) == (
         f"type 'a/msg/B' was not found in package 'a' of {tmp_path}/1; {tmp_path}/2 has it, but comes later"
     )
 
@@ -297,13 +292,13 @@ def test_shadowed_definitions(tmp_path: Path) -> None:
         )
     )
     names = [name("std_msgs/msg/String"), name("a/msg/A"), name("a/msg/B")]
-    shadowed = Sources((mine, other)).shadowed(names)
+    shadowed = Catalog((mine, other)).shadowed(names)
     assert [(winner.file, loser.file) for winner, loser in shadowed] == [
         (f"{tmp_path}/1/{each}.msg", f"{tmp_path}/2/{each}.msg")
         for each in ("std_msgs/msg/String", "a/msg/B")
     ]
     # The store only stands in for what is nowhere else.
-    assert list(Sources((mine, store_source("kilted"))).shadowed(names)) == []
+    assert list(Catalog((mine, store_source("kilted"))).shadowed(names)) == []
 
 
 # Names
@@ -352,11 +347,11 @@ PKG = {
     ],
 )
 def test_names(text: str, expected: str, tmp_path: Path) -> None:
-    sources = read(tmp_path, PKG)
-    assert sources.full_name(text) == name(expected)
+    catalog = read(tmp_path, PKG)
+    assert catalog.full_name(text) == name(expected)
     if text.count("/") == 2:
-        assert sources.definition_name(name(text)) == sources.owner(name(text)) == name(expected)
-        assert sources.message(name(text)).name == name(text)
+        assert catalog.definition_name(name(text)) == catalog.owner(name(text)) == name(expected)
+        assert catalog.message(name(text)).name == name(text)
 
 
 PLACE = "; looked in {}"
@@ -385,8 +380,8 @@ PLACE = "; looked in {}"
     ],
 )
 def test_errors_of_names(text: str, error: str, tmp_path: Path) -> None:
-    sources = read(tmp_path, PKG)
-    assert error_of(sources.full_name, text) == error.replace("{}", str(tmp_path))
+    catalog = read(tmp_path, PKG)
+    assert error_of(catalog.full_name, text) == error.replace("{}", str(tmp_path))
 
 
 # What belongs together
@@ -420,16 +415,16 @@ CHAIN = {
     ],
 )
 def test_closure(packages: list[str], types: list[str], expected: str, tmp_path: Path) -> None:
-    sources = read(tmp_path, CHAIN)
-    assert " ".join(map(str, closure(sources, packages, map(name, types)))) == expected
+    catalog = read(tmp_path, CHAIN)
+    assert " ".join(map(str, closure(catalog, packages, map(name, types)))) == expected
 
 
 def test_closure_of_services_and_actions(tmp_path: Path) -> None:
     files = {"a/srv/Do.srv": "c/C c\n---", "a/action/Go.action": "---\nc/C c\n---", "c/msg/C.msg": ""}
-    sources = Sources((folder_source(write(tmp_path, files)), store_source("kilted")))
+    catalog = Catalog((folder_source(write(tmp_path, files)), store_source("kilted")))
 
     def packages(type_name: str, events: bool) -> set[str]:
-        return {each.package for each in closure(sources, [], [name(type_name)], events=events)}
+        return {each.package for each in closure(catalog, [], [name(type_name)], events=events)}
 
     assert packages("a/srv/Do", False) == {"a", "c"}
     assert packages("a/srv/Do", True) == {"a", "c", "service_msgs", "builtin_interfaces"}
@@ -438,14 +433,14 @@ def test_closure_of_services_and_actions(tmp_path: Path) -> None:
 
 
 def test_dependencies_come_first(ros_prefix: Path) -> None:
-    sources = Sources(tuple(prefix_sources()))
-    order = closure(sources, sources.packages, events=True)
+    catalog = Catalog(tuple(prefix_sources()))
+    order = closure(catalog, catalog.packages, events=True)
     position = {each: index for index, each in enumerate(order)}
-    assert set(order) == {each for package in sources.packages.values() for each in package}
+    assert set(order) == {each for package in catalog.packages.values() for each in package}
     for each in order:
         # A type description refers to everything, directly or not.
-        for needed in sources.describe(each)["referenced_type_descriptions"]:
-            assert position[sources.definition_name(name(needed["type_name"]))] <= position[each]
+        for needed in catalog.describe(each)["referenced_type_descriptions"]:
+            assert position[catalog.definition_name(name(needed["type_name"]))] <= position[each]
 
 
 @pytest.mark.parametrize(
@@ -512,8 +507,8 @@ def test_dependencies_come_first(ros_prefix: Path) -> None:
     ],
 )
 def test_errors_of_closure(files: dict[str, str], error: str, tmp_path: Path) -> None:
-    sources = read(tmp_path, files)
-    assert error_of(closure, sources, sources.packages) == error.replace("{}", str(tmp_path))
+    catalog = read(tmp_path, files)
+    assert error_of(closure, catalog, catalog.packages) == error.replace("{}", str(tmp_path))
 
 
 def test_a_service_whose_response_holds_its_request(tmp_path: Path) -> None:
@@ -522,11 +517,11 @@ def test_a_service_whose_response_holds_its_request(tmp_path: Path) -> None:
 
 
 def test_missing_packages_that_were_asked_for(tmp_path: Path) -> None:
-    sources = read(tmp_path, {"sensor_msgs/msg/Imu.msg": ""})
-    assert error_of(closure, sources, ["sensors_msgs"]) == (
+    catalog = read(tmp_path, {"sensor_msgs/msg/Imu.msg": ""})
+    assert error_of(closure, catalog, ["sensors_msgs"]) == (
         f"package 'sensors_msgs' was not found; did you mean sensor_msgs?; looked in {tmp_path}"
     )
-    assert error_of(closure, sources, [], [name("sensor_msgs/msg/IMUU")]) == (
+    assert error_of(closure, catalog, [], [name("sensor_msgs/msg/IMUU")]) == (
         f"type 'sensor_msgs/msg/IMUU' was not found in package 'sensor_msgs' of {tmp_path}; "
         "did you mean sensor_msgs/msg/Imu?"
     )
@@ -535,10 +530,10 @@ def test_missing_packages_that_were_asked_for(tmp_path: Path) -> None:
 def test_definitions_nested_deeper_than_the_stack(tmp_path: Path) -> None:
     depth = 3000
     files = {f"a/msg/A{i}.msg": f"A{i + 1} a" for i in range(depth)} | {f"a/msg/A{depth}.msg": ""}
-    sources = read(tmp_path, files)
-    order = closure(sources, ["a"])
+    catalog = read(tmp_path, files)
+    order = closure(catalog, ["a"])
     assert order == [name(f"a/msg/A{i}") for i in range(depth, -1, -1)]
-    assert len(sources.describe(order[-1])["referenced_type_descriptions"]) == depth
+    assert len(catalog.describe(order[-1])["referenced_type_descriptions"]) == depth
 
 
 # The embedded store as a source
@@ -569,14 +564,14 @@ def test_which_distribution(
 
 def test_packages_before_the_store(tmp_path: Path) -> None:
     mine = folder_source(write(tmp_path, {"std_msgs/msg/String.msg": "string text"}))
-    sources = Sources((mine, store_source("kilted")))
-    assert list(sources.package("std_msgs")) == [name("std_msgs/msg/String")]
-    assert sources.definition(name("sensor_msgs/msg/Imu")).origin == "embedded store kilted"
-    assert error_of(sources.definition, name("std_msgs/msg/Bool")) == (
+    catalog = Catalog((mine, store_source("kilted")))
+    assert list(catalog.package("std_msgs")) == [name("std_msgs/msg/String")]
+    assert catalog.definition(name("sensor_msgs/msg/Imu")).origin == "embedded store kilted"
+    assert error_of(catalog.definition, name("std_msgs/msg/Bool")) == (
         f"type 'std_msgs/msg/Bool' was not found in package 'std_msgs' of {tmp_path}; "
         "embedded store kilted has it, but comes later"
     )
-    assert error_of(sources.package, "std_msg") == (
+    assert error_of(catalog.package, "std_msg") == (
         f"package 'std_msg' was not found; did you mean std_msgs or tf2_msgs or stereo_msgs?; "
         f"looked in {tmp_path}, embedded store kilted"
     )
