@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "../packed_fields.hpp"
-#include "../transcode.hpp"
+#include <rosidl_adapter_proto/packed_fields.hpp>
+#include <rosidl_adapter_proto/transcode.hpp>
 
 namespace nb = nanobind;
 

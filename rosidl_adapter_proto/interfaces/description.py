@@ -22,10 +22,12 @@ from rosidl_adapter_proto.interfaces.model import (
     Service,
     StringType,
     TypeName,
+    ValueType,
     messages,
     references,
     value_type,
 )
+from rosidl_adapter_proto.interfaces.scalars import SCALARS
 
 # type_description_interfaces/msg/FieldType: arrays, bounded and unbounded sequences add a multiple of 48.
 FIELD_TYPE_IDS = {
@@ -51,6 +53,7 @@ FIELD_TYPE_IDS = {
     "bounded wstring": 22,
 }
 ARRAY_OFFSET, BOUNDED_SEQUENCE_OFFSET, UNBOUNDED_SEQUENCE_OFFSET = 48, 96, 144
+_ELEMENT_NAMES = {type_id: name for name, type_id in FIELD_TYPE_IDS.items()}
 
 
 class FieldTypeDescription(TypedDict):
@@ -149,6 +152,32 @@ def field_type_description(field_type: FieldType) -> FieldTypeDescription:
         "string_capacity": string_capacity,
         "nested_type_name": nested,
     }
+
+
+def described_field_type(description: FieldTypeDescription) -> FieldType:
+    """Return the type that `field_type_description` describes.
+
+    Raises:
+        ValueError: The type id is none of REP-2011, or the name of a nested type is none.
+    """
+    type_id = description["type_id"]
+    shape, element_id = divmod(type_id - 1, ARRAY_OFFSET)
+    offset, key = shape * ARRAY_OFFSET, _ELEMENT_NAMES.get(element_id + 1)
+    if key is None or not 0 <= offset <= UNBOUNDED_SEQUENCE_OFFSET:
+        raise ValueError(f"type id {type_id} is unknown (REP-2011); correct the type description")
+    element: ValueType
+    if key == "nested":
+        element = TypeName.parse(description["nested_type_name"])
+    elif key in SCALARS and not SCALARS[key].is_string:
+        element = BasicType(key)
+    else:
+        bound = description["string_capacity"] if key.startswith("bounded") else None
+        element = StringType(wide=key.endswith("wstring"), bound=bound)
+    if offset == ARRAY_OFFSET:
+        return ArrayType(element, description["capacity"])
+    if offset == BOUNDED_SEQUENCE_OFFSET:
+        return SequenceType(element, description["capacity"])
+    return SequenceType(element) if offset == UNBOUNDED_SEQUENCE_OFFSET else element
 
 
 def individual_description(message: Message) -> IndividualTypeDescription:
