@@ -11,7 +11,7 @@ namespace {
 class CdrSize : public Stop {
  public:
   using At = uint64_t;
-  static constexpr bool kSizesOnly = true, kPlaces = false;
+  static constexpr bool kSizesOnly = true, kPlaces = false, kAllFields = true;
 
   struct Nested {
     At at;
@@ -76,7 +76,7 @@ class CdrSize : public Stop {
 class CdrWriter : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = true;
+  static constexpr bool kSizesOnly = false, kPlaces = true, kAllFields = true;
 
   struct Nested {
     At at;

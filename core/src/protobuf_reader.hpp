@@ -196,6 +196,7 @@ class ProtobufReader {
     const Operation* const last = plan_.end(message);
     Slot* const free = slots + message.count;
     for (const Operation* op = plan_.begin(message); op != last; ++op) {
+      if (!Sink::kAllFields && op->reading == Reading::Skip) continue;
       const ProtobufField field{message, *op, slots[op - plan_.begin(message)], range.end};
       at = op->shape == Shape::Single ? one(field, free, at) : many(field, free, at);
       if (Sink::failed(at)) return input_.leave(*op), at;
