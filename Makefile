@@ -42,10 +42,19 @@ demo: $(VENV)/ready
 
 test: check test-core test-kilted test-jazzy test-colcon test-fuzz
 
+CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/python/*.cpp core/test/*.?pp core/fuzz/*.cpp)
+
 check: $(VENV)/ready
-	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks
+	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks core
+	$(BIN)/clang-format --dry-run --Werror $(CPP_FILES)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy
+
+# Slower than compiling, so not part of the tests.
+tidy: $(VENV)/ready
+	$(BIN)/cmake -S . -B build/core -DROSIDL_PROTO_TEST=ON -DROSIDL_PROTO_PYTHON=OFF \
+	  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
+	$(BIN)/clang-tidy -p build/core --quiet core/src/*.cpp core/test/*.cpp
 
 test-kilted: $(VENV)/ready
 	$(BIN)/python -m pytest
@@ -89,7 +98,8 @@ golden: $(VENV)/ready
 	$(BIN)/python -m pytest tests/generate/test_golden.py tests/transcode/test_plan_golden.py --update-golden
 
 format: $(VENV)/ready
-	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks
+	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks core
+	$(BIN)/clang-format -i $(CPP_FILES)
 	$(BIN)/ruff check --fix .
 
 clean:
