@@ -13,11 +13,11 @@ from rosidl_adapter_proto.interfaces.find import (
     Source,
     file_source,
     folder_source,
-    prefix_sources,
-    store_source,
+    installed_sources,
 )
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME
+from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,13 @@ class Options:
     numbering: str = "hash"
     lock_file: Path = Path(LOCK_FILE_NAME)
     events: bool = False
-    python_root: str = "rosidl_proto"
+    python_root: str = DEFAULT_PYTHON_ROOT
 
 
 def find_catalog(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Catalog:
     """Return every source in the order they win: `first`, included folders, ROS installations, the store."""
     folders = [folder_source(_existing(path)) for path in include]
-    return Catalog((*first, *folders, *prefix_sources(), store_source(distro)))
+    return Catalog((*first, *folders, *installed_sources(distro)))
 
 
 def find_request(

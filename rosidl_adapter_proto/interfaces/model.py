@@ -307,6 +307,23 @@ def messages(interface: Interface, *, events: bool = False) -> tuple[Message, ..
     )
 
 
+def parts(interface: Interface) -> dict[TypeName, dict[str, TypeName]]:
+    """Return the parts of each service and action that an interface is or has, by what ROS calls them."""
+    if isinstance(interface, Message):
+        return {}
+    if isinstance(interface, Service):
+        return {interface.name: {"request": interface.request.name, "response": interface.response.name}}
+    own = {
+        "goal": interface.goal.name,
+        "result": interface.result.name,
+        "feedback": interface.feedback.name,
+        "send_goal": interface.send_goal.name,
+        "get_result": interface.get_result.name,
+        "feedback_message": interface.feedback_message.name,
+    }
+    return {interface.name: own, **parts(interface.send_goal), **parts(interface.get_result)}
+
+
 def references(message: Message) -> Iterator[tuple[Field, TypeName]]:
     """Yield each field whose value is another message, or an array or sequence of one, and that message's name."""
     for each in message.fields:

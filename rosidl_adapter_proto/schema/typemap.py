@@ -11,6 +11,9 @@ from rosidl_adapter_proto.interfaces.scalars import SCALARS
 MSG_TYPE_TO_PROTO = {name: row.protobuf for name, row in SCALARS.items()}
 """The protobuf type of each IDL type; a `wstring` is its UTF-16 code units, little-endian, without a mark."""
 
+DEFAULT_PYTHON_ROOT = "rosidl_proto"
+"""The namespace package that generated packages are in, unless another is chosen."""
+
 PROTO_PACKAGE_POSTFIX = "pb"
 """The last part of each protobuf package name."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,9 @@ from rosidl_adapter_proto.interfaces.msg import parse_msg
 from rosidl_adapter_proto.schema.descriptor import file_descriptor
 from rosidl_adapter_proto.schema.numbering import HashNumbering, Numbering, SequentialNumbering
 from rosidl_adapter_proto.schema.proto import ProtoFile, proto_file
+
+# protoc before 26 has an option for fields with the same JSON name, but does not heed it in proto3.
+PROTOC_TAKES_JSON_CONFLICTS = tuple(map(int, version("grpcio-tools").split(".")[:2])) >= (1, 66)
 
 FOO = TypeName("pkg", "msg", "Foo")
 
@@ -71,7 +75,8 @@ def test_fields_that_share_a_json_name() -> None:
     assert file.messages[0].has_json_conflict
     options = file_descriptor(file).message_type[0].options
     assert options.SerializeToString() == b"\x58\x01"
-    assert_equal_to_protoc([file])
+    if PROTOC_TAKES_JSON_CONFLICTS:
+        assert_equal_to_protoc([file])
 
 
 def test_names_that_mean_something_in_proto_files() -> None:
