@@ -303,8 +303,7 @@ def _generated_module(name: TypeName) -> str:
 def _import_generated_code(name: TypeName) -> None:
     """Import generated code of an interface, if there is any.
 
-    The default pool can hold one version of a file. Were another than that of the generated code there first, this could
-    not be imported any more.
+    The default pool holds one version of a file: if another came first, generated code could not be imported any more.
     """
     module = _generated_module(name)
     try:
