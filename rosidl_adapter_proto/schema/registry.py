@@ -27,7 +27,7 @@ from rosidl_adapter_proto.interfaces.model import ScalarValue, TypeName, parts
 from rosidl_adapter_proto.schema.descriptor import file_descriptor
 from rosidl_adapter_proto.schema.numbering import HashNumbering, Numbering, SequentialNumbering
 from rosidl_adapter_proto.schema.proto import ProtoFile, ProtoMessage, check_names, proto_file
-from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT, proto_path
+from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
 MessageClass = type[ProtobufMessage]
 
@@ -135,8 +135,7 @@ class TypeRegistry:
     many threads.
 
     A protobuf class is that of generated code, which is imported where it is found, or of the same descriptor pool.
-    Where that holds another version of a type or of one that it refers to, the class is one of a pool that the registry
-    keeps for itself.
+    Where that holds another version of a type or of one that it refers to, the class is one of another pool.
 
     Args:
         catalog: Where definitions come from: by default what is installed (`AMENT_PREFIX_PATH` and the environment of
@@ -155,9 +154,7 @@ class TypeRegistry:
         self._catalog = Catalog(tuple(installed_sources())) if catalog is None else catalog
         self._numbering = _numbering(lock_file)
         self._events = events
-        self._lock = RLock()
-        self._pool = DescriptorPool()
-        self._files: dict[str, _File] = {}
+        self._files: dict[TypeName, _File] = {}
         self._schemas: dict[TypeName, Schema] = {}
 
     @classmethod
@@ -225,16 +222,17 @@ class TypeRegistry:
             SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it.
         """
         type_name = name if isinstance(name, TypeName) else _parsed(name)
-        with self._lock:
+        with _lock:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._schema(type_name)
             return self._schemas[type_name]
 
     def _schema(self, name: TypeName) -> Schema:
         owner = self._catalog.definition_name(name)
-        file = self._file(owner)
-        message = next((each for each in file.proto.messages if each.type_name == name), None)
-        group = parts(file.proto.source).get(name, {})
+        descriptor = self._descriptor(owner)
+        file = self._files[owner].proto
+        message = next((each for each in file.messages if each.type_name == name), None)
+        group = parts(file.source).get(name, {})
         if message is None and not group:
             raise DefinitionError(f"{name} is the event of a service: it needs a registry with events=True")
         description = self._catalog.describe(name)
@@ -242,57 +240,95 @@ class TypeRegistry:
             str(name),
             type_hash(description),
             description,
-            file.proto,
+            file,
             message,
             {part: self[part_name] for part, part_name in group.items()},
-            _message_class(file.descriptor.message_types_by_name[name.name], owner) if message else None,
+            _message_class(descriptor.message_types_by_name[name.name], owner) if message else None,
         )
+
+    def _descriptor(self, name: TypeName) -> FileDescriptor:
+        """Return the file of an interface in a pool that has everything it refers to in the same version."""
+        names = type_closure(self._catalog, name, events=self._events)
+        for each in names:
+            if each not in self._files:
+                self._files[each] = self._file(each)
+                _import_generated_code(each)
+        check_names(each.proto for each in self._files.values())
+        try:
+            return _loaded([self._files[each] for each in names])
+        except _RefusedError as error:
+            raise SchemaError(f"{name}: protobuf does not take what it becomes: {error}") from None
 
     def _file(self, name: TypeName) -> _File:
-        """Return the file of an interface, with all that it needs loaded as well."""
-        path = proto_path(name)
-        if path not in self._files:
-            for each in type_closure(self._catalog, name, events=self._events):
-                if proto_path(each) not in self._files:
-                    self._files[proto_path(each)] = self._loaded(each)
-        return self._files[path]
-
-    def _loaded(self, name: TypeName) -> _File:
-        """Load the file of an interface, where those that it imports have been loaded."""
         interface = self._catalog.definition(name).interface
         proto = proto_file(interface, self._numbering, self._catalog.definition_name, events=self._events)
-        check_names([*(each.proto for each in self._files.values()), proto])
-        serialized = file_descriptor(proto).SerializeToString(deterministic=True)
-        descriptor = None
-        if all(self._files[path].is_shared for path in proto.imports):
-            _import_generated_code(name)
-            descriptor = _shared_descriptor(proto.path, serialized)
-        file = _File(
-            proto, serialized, descriptor or self._own_descriptor(name, serialized), descriptor is not None
-        )
-        for each in file.descriptor.message_types_by_name.values():
-            _message_class(each, name)
-        return file
-
-    def _own_descriptor(self, name: TypeName, serialized: bytes) -> FileDescriptor:
-        """Add a file to the pool of this registry, with all that it imports."""
-        *imported, _ = type_closure(self._catalog, name, events=self._events)
-        for each in imported:
-            self._pool.AddSerializedFile(self._files[proto_path(each)].serialized)
-        try:
-            self._pool.AddSerializedFile(serialized)
-        except TypeError as error:
-            raise SchemaError(f"{name}: protobuf does not take what it becomes ({error})") from None
-        return self._pool.FindFileByName(proto_path(name))
+        return _File(name, proto, file_descriptor(proto).SerializeToString(deterministic=True))
 
 
 class _File(NamedTuple):
-    """A `.proto` file that was loaded; it is shared if it is in protobuf's default pool."""
+    """The `.proto` file of an interface, and its descriptor."""
 
+    name: TypeName
     proto: ProtoFile
     serialized: bytes
-    descriptor: FileDescriptor
-    is_shared: bool
+
+
+class _RefusedError(Exception):
+    """A descriptor pool has another version of a file or message, or does not take it at all."""
+
+
+_lock = RLock()
+"""Held by any registry that makes a type: descriptor pools are shared by all of them."""
+
+_other_pools: list[DescriptorPool] = []
+"""Pools for versions of types that the default pool cannot have since it has others."""
+
+_kept_classes: set[MessageClass] = set()
+"""Every class that was made: releases of protobuf before 4.22 crash where that of a nested message is gone."""
+
+
+def _loaded(files: list[_File]) -> FileDescriptor:
+    """Return the last of some files in the first pool that can have them all, and make the classes of all messages.
+
+    Raises:
+        _RefusedError: Not even a new pool takes them.
+    """
+    for pool in (descriptor_pool.Default(), *_other_pools):
+        try:
+            return _loaded_in(pool, files)
+        except _RefusedError:
+            continue
+    pool = DescriptorPool()
+    descriptor = _loaded_in(pool, files)
+    _other_pools.append(pool)
+    return descriptor
+
+
+def _loaded_in(pool: DescriptorPool, files: list[_File]) -> FileDescriptor:
+    found = [_find(pool, each.proto.path) for each in files]
+    for file, descriptor in zip(files, found, strict=True):
+        if descriptor is not None and descriptor.serialized_pb != file.serialized:
+            raise _RefusedError(f"there is another version of {file.proto.path}")
+    descriptors = [each or _added(pool, file) for file, each in zip(files, found, strict=True)]
+    for file, descriptor in zip(files, descriptors, strict=True):
+        messages = descriptor.message_types_by_name.values()
+        _kept_classes.update(_message_class(each, file.name) for each in messages)
+    return descriptors[-1]
+
+
+def _find(pool: DescriptorPool, path: str) -> FileDescriptor | None:
+    try:
+        return pool.FindFileByName(path)
+    except KeyError:
+        return None
+
+
+def _added(pool: DescriptorPool, file: _File) -> FileDescriptor:
+    try:
+        pool.AddSerializedFile(file.serialized)
+    except TypeError as error:
+        raise _RefusedError(str(error)) from None
+    return pool.FindFileByName(file.proto.path)
 
 
 def _generated_module(name: TypeName) -> str:
@@ -311,20 +347,6 @@ def _import_generated_code(name: TypeName) -> None:
     except ModuleNotFoundError as error:
         if not f"{module}.".startswith(f"{error.name}."):  # what is missing is something that it needs
             raise
-
-
-def _shared_descriptor(path: str, serialized: bytes) -> FileDescriptor | None:
-    """Return a file of the default pool, where it is added if it is new; None if there is another version of it."""
-    pool = descriptor_pool.Default()
-    try:
-        descriptor = pool.FindFileByName(path)
-    except KeyError:
-        try:
-            pool.AddSerializedFile(serialized)
-        except TypeError:  # a file of another name has the same message
-            return None
-        descriptor = pool.FindFileByName(path)
-    return descriptor if descriptor.serialized_pb == serialized else None
 
 
 def _message_class(descriptor: Descriptor, owner: TypeName) -> MessageClass:
