@@ -328,7 +328,7 @@ def test_deep_nesting(depth: int) -> None:
     registry = TypeRegistry.from_texts({**texts, f"{package}/msg/M{depth}": "int8 x"})
     schema = registry[f"{package}/msg/M0"]
     assert len(schema.type_description["referenced_type_descriptions"]) == depth
-    descriptor = schema.descriptor
+    descriptor: Any = schema.descriptor
     for _ in range(depth):
         (field,) = descriptor.fields
         descriptor = field.message_type
