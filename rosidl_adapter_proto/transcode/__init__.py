@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE, Codec, Transcoder
-from rosidl_adapter_proto.transcode.error import TranscodeError
+from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE, Batch, Codec, Transcoder
+from rosidl_adapter_proto.transcode.error import BufferTooSmallError, TranscodeError
 
-__all__ = ["MAXIMUM_SIZE", "Codec", "TranscodeError", "Transcoder"]
+__all__ = ["MAXIMUM_SIZE", "Batch", "BufferTooSmallError", "Codec", "TranscodeError", "Transcoder"]
