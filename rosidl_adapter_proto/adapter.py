@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
     from rosidl_adapter_proto.interfaces.description import IndividualTypeDescription, TypeDescription
-    from rosidl_adapter_proto.transcode import Transcoder
+    from rosidl_adapter_proto.transcode import Codec, Transcoder
 
 CustomT = TypeVar("CustomT", bound=Message)
 RosT = TypeVar("RosT")
@@ -73,20 +73,27 @@ class _RosClass:
         return ros_class
 
 
-class _Transcoder:
-    """Makes the native transcoder of an adapter when it is first asked for, and then makes way for it."""
+class _Codec:
+    """Makes the codec of an adapter when it is first asked for, and then makes way for it."""
 
-    def __get__(self, instance: object, owner: type[TypeAdapter[Any, Any]]) -> Transcoder:
-        from rosidl_adapter_proto.transcode import Transcoder
+    def __get__(self, instance: object, owner: type[TypeAdapter[Any, Any]]) -> Codec[Any]:
+        from rosidl_adapter_proto.transcode import Codec
 
-        descriptor, message_class = owner.custom_type.DESCRIPTOR, owner.custom_type
-        owner.transcoder = Transcoder(owner.type_description(), descriptor, message_class=message_class)
+        owner.codec = Codec(owner.type_description(), owner.custom_type)
         # From now on these are the native methods themselves, unless somebody has put others in their place.
-        native = {"to_cdr": owner.transcoder.message_to_cdr, "from_cdr": owner.transcoder.cdr_to_message}
+        native = {"to_cdr": owner.codec.to_cdr, "from_cdr": owner.codec.from_cdr}
         for name, method in native.items():
             _native_types.add(type(method))
             if vars(owner).get(name) is vars(TypeAdapter)[name]:
                 setattr(owner, name, method)
+        return owner.codec
+
+
+class _Transcoder:
+    """Takes the transcoder of an adapter from its codec."""
+
+    def __get__(self, instance: object, owner: type[TypeAdapter[Any, Any]]) -> Transcoder:
+        owner.transcoder = owner.codec.transcoder
         return owner.transcoder
 
 
@@ -124,7 +131,8 @@ class TypeAdapter(Generic[CustomT, RosT]):
         fields: The fields of the ROS message, in order.
         defaults: Default values other than zero, in terms of protobuf.
         has_defaults: Whether the type or one inside it has any.
-        transcoder: Turns serialized messages from one format into the other, made when it is first asked for.
+        codec: Turns protobuf messages into serialized ROS messages and back, made when it is first asked for.
+        transcoder: Turns serialized messages from one format into the other; that of the codec.
         ros_class: Where the ROS message class is: `module:Class`.
     """
 
@@ -136,15 +144,17 @@ class TypeAdapter(Generic[CustomT, RosT]):
     defaults: ClassVar[Mapping[str, Any]] = {}
     has_defaults: ClassVar[bool] = False
     if TYPE_CHECKING:
+        codec: ClassVar[Codec[Any]]
         transcoder: ClassVar[Transcoder]
     else:
+        codec = _Codec()
         transcoder = _Transcoder()
     ros_class: ClassVar[str]
 
     def __init_subclass__(cls, **arguments: Any) -> None:
         """Let a class that derives from an adapter in use have a transcoder of its own."""
         super().__init_subclass__(**arguments)
-        for name in ("transcoder", "ros_message_type", "to_cdr", "from_cdr"):
+        for name in ("codec", "transcoder", "ros_message_type", "to_cdr", "from_cdr"):
             if name in vars(cls) or (name == "ros_message_type" and "ros_class" not in vars(cls)):
                 continue
             inherited = next(vars(base)[name] for base in cls.__mro__[1:] if name in vars(base))
@@ -204,7 +214,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         Raises:
             ConversionError: A value does not fit; it is a `TranscodeError`, which has the place in the bytes as well.
         """
-        return cls.transcoder.message_to_cdr(source)
+        return cls.codec.to_cdr(source)
 
     @classmethod
     def from_cdr(cls, data: Buffer) -> CustomT:
@@ -213,7 +223,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
         Raises:
             ConversionError: The bytes are not a valid message of the type; it is a `TranscodeError`.
         """
-        message: CustomT = cls.transcoder.cdr_to_message(data)
+        message: CustomT = cls.codec.from_cdr(data)
         return message
 
     @classmethod
