@@ -10,7 +10,7 @@ import numpy
 from hypothesis import strategies as st
 
 from rosidl_adapter_proto.adapter import TypeAdapter
-from rosidl_adapter_proto.generate.python import TYPECODES
+from rosidl_adapter_proto.generate.targets.python.modules import TYPECODES
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,

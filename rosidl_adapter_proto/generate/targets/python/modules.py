@@ -201,15 +201,6 @@ class PythonModules:
         """Whether the type stub has a repeated field."""
         return any("_containers." in field.type for message in self.stubs for field in message.fields)
 
-    @property
-    def exports(self) -> dict[str, str]:
-        """Every public name and the module, relative to the package, that has it."""
-        adapters = [each.class_name for each in self.messages] + [each.class_name for each in self.groups]
-        return {
-            **dict.fromkeys(self.custom_names, f"{self.name}_pb2"),
-            **dict.fromkeys(adapters, f"{self.name}_adapter"),
-        }
-
 
 @dataclass(frozen=True)
 class Names:
@@ -273,6 +264,21 @@ def python_modules(file: ProtoFile, names: Names) -> PythonModules:
         groups=groups,
         stubs=tuple(_stub(each, source, names) for each in file.messages),
     )
+
+
+def exports(file: ProtoFile, names: Names) -> dict[str, str]:
+    """Return every public name of the modules of a file, and the module, relative to the package, that has it."""
+    interface = file.source
+    groups: tuple[TypeName, ...] = ()
+    if isinstance(interface, Service):
+        groups = (interface.name,)
+    elif isinstance(interface, Action):
+        groups = (interface.send_goal.name, interface.get_result.name, interface.name)
+    own = [each.source.name for each in file.messages]
+    return {
+        **dict.fromkeys((each.name for each in own), f"{interface.name.name}_pb2"),
+        **dict.fromkeys((names.adapter(each) for each in (*own, *groups)), f"{interface.name.name}_adapter"),
+    }
 
 
 # --- Adapters ---
