@@ -22,7 +22,6 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
     ValueType,
-    integer_range,
 )
 
 # NUL ends a C string, so ROS cannot send it.
@@ -82,7 +81,7 @@ class RosMessages:
             if value_type.name == "float":
                 return st.floats(-(2.0**127), 2.0**127, width=32) | st.sampled_from([inf, -inf])
             return st.floats(allow_nan=False)
-        return st.integers(*integer_range(value_type.name))
+        return st.integers(*value_type.scalar.range)
 
 
 def message_names(catalog: Catalog, names: list[TypeName]) -> list[TypeName]:

@@ -13,8 +13,7 @@ from rosidl_adapter_proto.interfaces.find import (
     Source,
     file_source,
     folder_source,
-    prefix_sources,
-    store_source,
+    installed_sources,
 )
 from rosidl_adapter_proto.interfaces.model import TypeName
 
@@ -37,7 +36,7 @@ class Request:
 def find_catalog(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Catalog:
     """Return every source in the order they win: `first`, included folders, ROS installations, the store."""
     folders = [folder_source(_existing(path)) for path in include]
-    return Catalog((*first, *folders, *prefix_sources(), store_source(distro)))
+    return Catalog((*first, *folders, *installed_sources(distro)))
 
 
 def find_request(

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering, SequentialNumbering
+from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
 
 class Kind(Enum):
@@ -123,7 +124,7 @@ class Options:
     python_root: str = _option(
         Kind.TEXT,
         "The namespace package of the generated Python packages.",
-        default="rosidl_proto",
+        default=DEFAULT_PYTHON_ROOT,
         metavar="NAME",
     )
 

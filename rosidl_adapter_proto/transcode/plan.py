@@ -14,16 +14,12 @@ from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
 from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.interfaces.description import (
-    ARRAY_OFFSET,
-    BOUNDED_SEQUENCE_OFFSET,
-    FIELD_TYPE_IDS,
-    UNBOUNDED_SEQUENCE_OFFSET,
     FieldDescription,
-    FieldTypeDescription,
     IndividualTypeDescription,
     TypeDescription,
+    described_type,
 )
-from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD
+from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, Shape, TypeName
 
 MAXIMUM_DEPTH = 100
 """How deep messages may be nested: protobuf's own limit for parsers."""
@@ -48,14 +44,6 @@ class Kind(IntEnum):
     STRING = 10
     WSTRING = 11
     MESSAGE = 12
-
-
-class Shape(IntEnum):
-    """How many elements a field has."""
-
-    SINGLE = 0
-    ARRAY = 1
-    SEQUENCE = 2
 
 
 @dataclass(frozen=True)
@@ -97,13 +85,9 @@ MAPPINGS = {
     "octet": Mapping(Kind.UINT8, FieldDescriptor.TYPE_UINT32, FieldDescriptor.TYPE_BYTES, repeated=False),
     "string": _repeated(Kind.STRING, FieldDescriptor.TYPE_STRING),
     "wstring": _repeated(Kind.WSTRING, FieldDescriptor.TYPE_BYTES),
-    "bounded string": _repeated(Kind.STRING, FieldDescriptor.TYPE_STRING),
-    "bounded wstring": _repeated(Kind.WSTRING, FieldDescriptor.TYPE_BYTES),
 }
 """How each IDL type is transcoded. `long double` is missing: Fast CDR copies the bytes of the machine, which are 80-bit
 x87 numbers on x86-64 and 128-bit IEEE numbers on ARM, and the encapsulation does not tell which."""
-
-_TYPE_NAMES = {number: name for name, number in FIELD_TYPE_IDS.items()}
 
 _PROTOBUF_TYPE_NAMES = {
     getattr(FieldDescriptor, f"TYPE_{name.upper()}"): name
@@ -268,14 +252,16 @@ class _Builder:
         protobuf_field = descriptor.fields_by_name.get(name)
         if protobuf_field is None:
             raise SchemaError(f"{where}: {descriptor.full_name} does not have this field; generate it again")
-        shape, element_id = _shape(field_type)
-        mapping = MAPPINGS.get(_TYPE_NAMES.get(element_id, ""))
+        try:
+            shape, element, capacity, string_bound = described_type(field_type)
+        except ValueError as error:
+            raise SchemaError(f"{where}: {error}") from None
+        element_name = "nested" if isinstance(element, TypeName) else element.name
+        mapping = MAPPINGS.get(element_name)
         if mapping is None:
-            type_text = _TYPE_NAMES.get(element_id, f"type id {field_type['type_id']}")
             raise SchemaError(
-                f"{where}: {type_text} has no one layout in CDR and cannot be transcoded; make the field a double"
-                if type_text == "long double"
-                else f"{where}: {type_text} is unknown (REP-2011); correct the type description"
+                f"{where}: {element_name} has no one layout in CDR and cannot be transcoded; "
+                "make the field a double"
             )
         _check_protobuf_type(where, mapping, shape, protobuf_field)
         message = 0
@@ -288,23 +274,11 @@ class _Builder:
             number=protobuf_field.number,
             kind=Kind.PLACEHOLDER if name == EMPTY_STRUCT_FIELD else mapping.kind,
             shape=shape,
-            count=UNBOUNDED if shape is Shape.SINGLE else field_type["capacity"] or UNBOUNDED,
-            string_bound=field_type["string_capacity"] or UNBOUNDED,
+            count=capacity or UNBOUNDED,
+            string_bound=string_bound or UNBOUNDED,
             message=message,
             omit_empty=self._omit_empty,
         )
-
-
-def _shape(field_type: FieldTypeDescription) -> tuple[Shape, int]:
-    """Return the shape of a field and the type id of its elements."""
-    type_id = field_type["type_id"]
-    if type_id <= ARRAY_OFFSET:
-        return Shape.SINGLE, type_id
-    if type_id <= BOUNDED_SEQUENCE_OFFSET:
-        return Shape.ARRAY, type_id - ARRAY_OFFSET
-    if type_id <= UNBOUNDED_SEQUENCE_OFFSET:
-        return Shape.SEQUENCE, type_id - BOUNDED_SEQUENCE_OFFSET
-    return Shape.SEQUENCE, type_id - UNBOUNDED_SEQUENCE_OFFSET
 
 
 def _check_protobuf_type(where: str, mapping: Mapping, shape: Shape, field: FieldDescriptor) -> None:

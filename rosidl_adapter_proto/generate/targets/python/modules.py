@@ -30,7 +30,6 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
     Value,
-    integer_range,
     references,
     value_type,
 )
@@ -562,7 +561,7 @@ def _scalar(element: BasicType | StringType) -> tuple[str, str]:
             return to_custom, to_ros
         return to_custom.format(f"text({{}}, {element.bound})"), f"text({to_ros}, {element.bound})"
     if element.name in _NARROW_INTEGERS:
-        lowest, highest = integer_range(element.name)
+        lowest, highest = element.scalar.range
         check = f"in_range({{}}, {lowest}, {highest})"
         return check, check
     if element.name in _LARGEST_CHARACTER:
