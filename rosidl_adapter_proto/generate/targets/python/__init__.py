@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from rosidl_adapter_proto.generate.render import render_python
 from rosidl_adapter_proto.generate.targets import Files, Generation
-from rosidl_adapter_proto.generate.targets.python.modules import Names, exports, python_modules
+from rosidl_adapter_proto.generate.targets.python.modules import python_modules
+from rosidl_adapter_proto.generate.targets.python.names import Names, exports
 from rosidl_adapter_proto.schema.proto import ProtoFile
 
 

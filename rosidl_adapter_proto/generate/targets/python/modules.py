@@ -1,57 +1,34 @@
 """From a `.proto` file to its Python modules, as plain data in which everything is decided.
 
 Each interface gets three modules: `<Name>_pb2.py` with the protobuf classes, `<Name>_pb2.pyi` with their types, and
-`<Name>_adapter.py` with the adapters. What a conversion does for each kind of field is decided here, one line of
-Python at a time; the templates only put the lines into place.
+`<Name>_adapter.py` with the adapters. The templates only put into place what stands here.
 """
 
 from __future__ import annotations
 
 import keyword
 import math
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.errors import SchemaError
-from rosidl_adapter_proto.interfaces.catalog import Catalog
-from rosidl_adapter_proto.interfaces.description import field_type_description
+from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines, plain_lines
+from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer
+from rosidl_adapter_proto.generate.targets.python.names import Names
+from rosidl_adapter_proto.generate.targets.python.stubs import StubMessage, stub, stub_alias
 from rosidl_adapter_proto.interfaces.model import (
-    EMPTY_STRUCT_FIELD,
     Action,
-    ArrayType,
-    BasicType,
-    FieldType,
     Interface,
     Message,
     SequenceType,
     Service,
-    StringType,
     TypeName,
-    Value,
+    parts,
     references,
-    value_type,
 )
-from rosidl_adapter_proto.schema.proto import ProtoField, ProtoFile, ProtoMessage
-from rosidl_adapter_proto.schema.typemap import proto_full_name
-
-# What array.array calls the numeric types whose ROS arrays are array.array (sequences) or numpy (fixed arrays).
-TYPECODES = {
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-    "float": "f",
-    "double": "d",
-}
-_NARROW_INTEGERS = ("int8", "uint8", "int16", "uint16")
-_FIXED_WIDTH = ("int32", "uint32", "int64", "uint64", "float", "double")
-_LARGEST_CHARACTER = {"char": 0x7F, "wchar": 0xFFFF}
+from rosidl_adapter_proto.schema.conversion import message_conversion
+from rosidl_adapter_proto.schema.proto import ProtoField, ProtoFile, ProtoMessage, ProtoValue
 
 
 @dataclass(frozen=True)
@@ -67,8 +44,8 @@ class AdapterField:
 
     name: str
     info: str
-    to_custom: tuple[str, ...]
-    to_ros: tuple[str, ...]
+    to_custom: Lines
+    to_ros: Lines
 
 
 @dataclass(frozen=True)
@@ -123,44 +100,6 @@ class GroupAdapter:
 
 
 @dataclass(frozen=True)
-class StubField:
-    """A field in the type stub: what it is when it is read, and what the constructor takes."""
-
-    name: str
-    is_attribute: bool
-    is_message: bool
-    type: str
-    argument: str
-    comment: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class StubMessage:
-    """A message class in the type stub; fields named like keywords of Python are only in `all_names`."""
-
-    name: str
-    comment: tuple[str, ...]
-    fields: tuple[StubField, ...]
-    all_names: tuple[str, ...]
-    self_name: str
-
-    @property
-    def attributes(self) -> tuple[StubField, ...]:
-        """The fields that are plain attributes."""
-        return tuple(each for each in self.fields if each.is_attribute)
-
-    @property
-    def properties(self) -> tuple[StubField, ...]:
-        """The fields that cannot be assigned: messages and repeated fields."""
-        return tuple(each for each in self.fields if not each.is_attribute)
-
-    @property
-    def message_fields(self) -> tuple[StubField, ...]:
-        """The fields that can be asked for with `HasField`."""
-        return tuple(each for each in self.fields if each.is_message)
-
-
-@dataclass(frozen=True)
 class PythonModules:
     """The Python modules of one interface.
 
@@ -193,42 +132,12 @@ class PythonModules:
     @property
     def stub_imports(self) -> tuple[tuple[str, str], ...]:
         """The modules that the type stub imports, and what each is called there."""
-        return tuple((module, _stub_alias(module)) for module in self.pb2_imports)
+        return tuple((module, stub_alias(module)) for module in self.pb2_imports)
 
     @property
     def has_containers(self) -> bool:
         """Whether the type stub has a repeated field."""
         return any("_containers." in field.type for message in self.stubs for field in message.fields)
-
-
-@dataclass(frozen=True)
-class Names:
-    """How things are called in generated Python.
-
-    Attributes:
-        root: The namespace package at the top, such as `rosidl_proto`.
-        catalog: Knows every type.
-    """
-
-    root: str
-    catalog: Catalog
-
-    def package(self, name: TypeName) -> str:
-        """Return the Python package of a type."""
-        return f"{self.root}.{name.package}.{name.namespace}"
-
-    def module(self, name: TypeName, suffix: str) -> str:
-        """Return the module of the interface that a type is part of."""
-        owner = self.catalog.definition_name(name)
-        return f"{self.package(owner)}.{owner.name}_{suffix}"
-
-    def adapter(self, name: TypeName) -> str:
-        """Return the class name of an adapter; not that of a message which happens to be called the same."""
-        package = self.catalog.package(name.package)
-        class_name = f"{name.name}Adapter"
-        while TypeName(name.package, name.namespace, class_name) in package:
-            class_name += "_"
-        return class_name
 
 
 def python_modules(file: ProtoFile, names: Names) -> PythonModules:
@@ -241,9 +150,11 @@ def python_modules(file: ProtoFile, names: Names) -> PythonModules:
     for part in (source.name.package, source.name.name):
         if keyword.iskeyword(part):
             raise SchemaError(f"{source.name}: {part!r} is a keyword of Python; rename it")
-    local = _local_adapter_names(file, names)
-    adapters = tuple(_message_adapter(each, source, names, local) for each in file.messages)
-    groups = _groups(source, names)
+    adapter_names = _local_adapter_names(file, names)
+    writer = Writer(adapter_names)
+    adapters = tuple(_message_adapter(each, source, names, writer) for each in file.messages)
+    groups = list(parts(source).items())
+    groups.sort(key=lambda each: each[0] == source.name)  # an action refers to its services
     return PythonModules(
         name=source.name.name,
         package=names.package(source.name),
@@ -252,61 +163,63 @@ def python_modules(file: ProtoFile, names: Names) -> PythonModules:
         pb2_imports=tuple(
             f"{names.root}.{path.removesuffix('.proto').replace('/', '.')}_pb2" for path in file.imports
         ),
-        helpers=_helpers(adapters),
+        helpers=tuple(sorted({*_USED_BY_ALL, *writer.helpers})),
         adapter_imports=tuple(
             (names.module(name, "adapter"), names.adapter(name), local_name)
-            for name, local_name in local.items()
+            for name, local_name in adapter_names.items()
             if names.catalog.definition_name(name) != source.name
         ),
         custom_names=tuple(each.name for each in file.messages),
         messages=adapters,
-        groups=groups,
-        stubs=tuple(_stub(each, source, names) for each in file.messages),
+        groups=tuple(_group(name, group, source, names) for name, group in groups),
+        stubs=tuple(stub(each, source, names) for each in file.messages),
     )
 
 
-def exports(file: ProtoFile, names: Names) -> dict[str, str]:
-    """Return every public name of the modules of a file, and the module, relative to the package, that has it."""
-    interface = file.source
-    groups: tuple[TypeName, ...] = ()
-    if isinstance(interface, Service):
-        groups = (interface.name,)
-    elif isinstance(interface, Action):
-        groups = (interface.send_goal.name, interface.get_result.name, interface.name)
-    own = [each.source.name for each in file.messages]
-    return {
-        **dict.fromkeys((each.name for each in own), f"{interface.name.name}_pb2"),
-        **dict.fromkeys((names.adapter(each) for each in (*own, *groups)), f"{interface.name.name}_adapter"),
-    }
+_USED_BY_ALL = ("check_custom", "conversion_error", "finish_custom", "finish_ros_message")
 
 
 # --- Adapters ---
 
 
 def _message_adapter(
-    proto: ProtoMessage, interface: Interface, names: Names, local: Mapping[TypeName, str]
+    proto: ProtoMessage,
+    interface: Interface,
+    names: Names,
+    writer: Writer,
 ) -> MessageAdapter:
-    message = proto.source
-    packed_numbers = _packed_numbers(proto)
+    conversion = message_conversion(proto)
+    lines = {field.name: writer.lines(field, how) for field, how in conversion.fields}
     return MessageAdapter(
-        class_name=names.adapter(message.name),
+        class_name=names.adapter(proto.type_name),
         custom=proto.name,
-        custom_full_name=proto_full_name(message.name),
-        type_name=str(message.name),
-        type_hash=names.catalog.hash(message.name),
-        ros_class=_ros_class(message.name, interface),
-        comment=_docstring_lines(message.comment),
+        custom_full_name=proto.full_name,
+        type_name=str(proto.type_name),
+        type_hash=names.catalog.hash(proto.type_name),
+        ros_class=_ros_class(proto.type_name, interface),
+        comment=docstring_lines(proto.source.comment),
         constants=tuple(
-            AdapterConstant(
-                _constant_name(each.name), _python_literal(each.value), _plain_lines(each.comment)
-            )
-            for each in message.constants
+            AdapterConstant(_constant_name(each.name), _literal(each.value), plain_lines(each.comment))
+            for each in proto.constants
         ),
-        packed_numbers=packed_numbers,
-        fields=tuple(_adapter_field(each, local, packed_numbers) for each in proto.fields),
-        defaults=_defaults(message),
-        has_defaults=_has_defaults(message, names),
+        packed_numbers=conversion.packed_numbers,
+        fields=tuple(
+            AdapterField(each.name, _field_info(each, writer.adapter_names), *lines.get(each.name, ((), ())))
+            for each in proto.fields
+        ),
+        defaults=_defaults(proto),
+        has_defaults=_has_defaults(proto.source, names),
     )
+
+
+def _field_info(field: ProtoField, adapter_names: Mapping[TypeName, str]) -> str:
+    """Return the arguments of a `FieldInfo` behind the name, without those that have their defaults."""
+    arguments = [field.type_id, field.capacity or 0, field.string_bound or 0]
+    if isinstance(field.element, TypeName):
+        return ", ".join([*map(str, arguments), adapter_names[field.element]])
+    while arguments[-1] == 0:
+        arguments.pop()
+    return ", ".join(map(str, arguments))
 
 
 def _constant_name(name: str) -> str:
@@ -324,14 +237,14 @@ def _ros_class(name: TypeName, interface: Interface) -> str:
             interface.send_goal: "SendGoalService",
             interface.get_result: "GetResultService",
         }
-        parts = {
+        own = {
             interface.goal.name: "Goal",
             interface.result.name: "Result",
             interface.feedback.name: "Feedback",
             interface.feedback_message.name: "Impl.FeedbackMessage",
         }
-        if name in parts:
-            path += f".{parts[name]}"
+        if name in own:
+            path += f".{own[name]}"
         for service, service_class in implementation.items():
             if name.name.startswith(service.name.name):
                 path += f".Impl.{service_class}{_ros_part(name, service)}"
@@ -343,60 +256,24 @@ def _ros_part(name: TypeName, service: Service) -> str:
     return f".{part}" if part else ""
 
 
-def _groups(interface: Interface, names: Names) -> tuple[GroupAdapter, ...]:
-    if isinstance(interface, Message):
-        return ()
-    if isinstance(interface, Service):
-        return (_service_group(interface, interface, names),)
-    services = (interface.send_goal, interface.get_result)
-    parts = {
-        "goal": interface.goal.name,
-        "result": interface.result.name,
-        "feedback": interface.feedback.name,
-        "send_goal": interface.send_goal.name,
-        "get_result": interface.get_result.name,
-        "feedback_message": interface.feedback_message.name,
-    }
-    return (
-        *(_service_group(each, interface, names) for each in services),
-        GroupAdapter(
-            class_name=names.adapter(interface.name),
-            base="ActionAdapter",
-            parameters=(interface.goal.name.name, interface.result.name.name, interface.feedback.name.name),
-            type_name=str(interface.name),
-            type_hash=names.catalog.hash(interface.name),
-            ros_class=_ros_class(interface.name, interface),
-            parts=tuple((part, names.adapter(name)) for part, name in parts.items()),
-        ),
-    )
+_GROUPS = {
+    "request": ("ServiceAdapter", ("request", "response")),
+    "goal": ("ActionAdapter", ("goal", "result", "feedback")),
+}
+"""The base class of a group, and the parts that it is parametrized with, by the first part."""
 
 
-def _service_group(service: Service, interface: Interface, names: Names) -> GroupAdapter:
+def _group(name: TypeName, group: Mapping[str, TypeName], interface: Interface, names: Names) -> GroupAdapter:
+    base, parameters = _GROUPS[next(iter(group))]
     return GroupAdapter(
-        class_name=names.adapter(service.name),
-        base="ServiceAdapter",
-        parameters=(service.request.name.name, service.response.name.name),
-        type_name=str(service.name),
-        type_hash=names.catalog.hash(service.name),
-        ros_class=_ros_class(service.name, interface),
-        parts=(
-            ("request", names.adapter(service.request.name)),
-            ("response", names.adapter(service.response.name)),
-        ),
+        class_name=names.adapter(name),
+        base=base,
+        parameters=tuple(group[part].name for part in parameters),
+        type_name=str(name),
+        type_hash=names.catalog.hash(name),
+        ros_class=_ros_class(name, interface),
+        parts=tuple((part, names.adapter(each)) for part, each in group.items()),
     )
-
-
-def _helpers(adapters: Iterable[MessageAdapter]) -> tuple[str, ...]:
-    """Return the functions of `rosidl_adapter_proto.adapter` that the lines of a module call."""
-    lines = [
-        line for adapter in adapters for field in adapter.fields for line in field.to_custom + field.to_ros
-    ]
-    called = {name for line in lines for name in re.findall(r"(?<![\w.])(\w+)\(", line)}
-    passed = {name for line in lines for name in re.findall(r"\beach\((\w+),", line)}
-    used_by_all = {"check_custom", "conversion_error", "finish_custom", "finish_ros_message"}
-    if any(adapter.packed_numbers for adapter in adapters):
-        called.add("packed_fields")
-    return tuple(sorted((called | passed | used_by_all) - {"list", "getattr", "setattr"}))
 
 
 def _local_adapter_names(file: ProtoFile, names: Names) -> dict[TypeName, str]:
@@ -417,190 +294,12 @@ def _local_adapter_names(file: ProtoFile, names: Names) -> dict[TypeName, str]:
     return dict(sorted(local.items()))
 
 
-def _packed_numbers(proto: ProtoMessage) -> tuple[int, ...]:
-    """Return the numbers of the fields that are read with `packed_fields`, all in one go.
-
-    Not in a message that holds many others: these would be serialized here, and once more each for itself.
-    """
-    if any(each.repeated and isinstance(value_type(each.source.type), TypeName) for each in proto.fields):
-        return ()
-    return tuple(each.number for each in proto.fields if _is_packed(each))
-
-
-def _is_packed(field: ProtoField) -> bool:
-    element = value_type(field.source.type)
-    return field.repeated and isinstance(element, BasicType) and element.name in _FIXED_WIDTH
-
-
-def _adapter_field(
-    proto: ProtoField, local: Mapping[TypeName, str], packed_numbers: tuple[int, ...]
-) -> AdapterField:
-    field = proto.source
-    description = field_type_description(field.type)
-    element = value_type(field.type)
-    info = [str(description["type_id"])]
-    if isinstance(element, TypeName):
-        info += [str(description["capacity"]), "0", local[element]]
-    elif description["string_capacity"]:
-        info += [str(description["capacity"]), str(description["string_capacity"])]
-    elif description["capacity"]:
-        info += [str(description["capacity"])]
-    if field.name == EMPTY_STRUCT_FIELD:
-        return AdapterField(field.name, ", ".join(info), (), ())
-    to_custom, to_ros = _conversion(proto, local, packed_numbers)
-    return AdapterField(field.name, ", ".join(info), to_custom, to_ros)
-
-
-Lines = tuple[str, ...]
-
-
-def _conversion(
-    proto: ProtoField, local: Mapping[TypeName, str], packed_numbers: tuple[int, ...]
-) -> tuple[Lines, Lines]:
-    """Return the lines that convert a field, to protobuf and to ROS."""
-    field = proto.source
-    source, target = _read("source", field.name), _read("message", field.name)
-    if not isinstance(field.type, (ArrayType, SequenceType)):
-        if isinstance(field.type, TypeName):
-            adapter = local[field.type]
-            return (
-                (f"{adapter}.fill_custom({source}, {target})",),
-                (f"{adapter}.fill_ros_message({source}, {target})",),
-            )
-        to_custom, to_ros = _scalar(field.type)
-        return (
-            (_assign(field.name, to_custom.format(source)),),
-            (_assign(field.name, to_ros.format(source)),),
-        )
-    element = field.type.value_type
-    checked = _checked(field.type, source, from_custom=False)
-    received = _checked(field.type, source, from_custom=True)
-    if isinstance(element, TypeName):
-        adapter = local[element]
-        to_custom_line = f"fill_each({adapter}.fill_custom, {checked}, {target})"
-        if isinstance(field.type, ArrayType):
-            value = f"ros_message_array({adapter}, {source}, {field.type.size})"
-        else:
-            value = f"ros_messages({adapter}, {received})"
-        return (to_custom_line,), (_assign(field.name, value),)
-    if isinstance(element, BasicType) and element.name in TYPECODES:
-        return _numeric_array(proto, element, checked, packed_numbers)
-    return _list(proto, element, checked, received)
-
-
-def _numeric_array(
-    proto: ProtoField, element: BasicType, checked: str, packed_numbers: tuple[int, ...]
-) -> tuple[Lines, Lines]:
-    field = proto.source
-    source, target = _read("source", field.name), _read("message", field.name)
-    code = TYPECODES[element.name]
-    values = f'numbers({checked}, "{code}")'
-    if proto.type == "bytes":
-        to_custom = _assign(field.name, f"{values}.tobytes()")
-    elif element.name in _FIXED_WIDTH:
-        to_custom = f"message.MergeFromString(packed({proto.number}, {values}))"
-    else:
-        to_custom = f"{target}.extend({values}.tolist())"
-    if proto.number in packed_numbers:
-        data = f"arrays[{packed_numbers.index(proto.number)}]"
-        array = f'array_of({data}, "{code}")'
-    elif proto.type == "bytes":
-        data, array = source, f'numbers({source}, "{code}")'
-    else:
-        array = f'elements({source}, "{code}")'
-        data = f"{array}.tobytes()"
-    if isinstance(field.type, ArrayType):
-        return (to_custom,), (f"fill_array({target}, {array})",)
-    bound = field.type.bound if isinstance(field.type, SequenceType) else None
-    check = (f"at_most({source}, {bound})",) if bound else ()
-    # A new ROS message has an empty array here, unless the definition has a default value.
-    clear = (f"del {target}[:]",) if field.default else ()
-    return (to_custom,), (*check, *clear, f"{target}.frombytes({data})")
-
-
-def _list(
-    proto: ProtoField, element: BasicType | StringType, checked: str, received: str
-) -> tuple[Lines, Lines]:
-    field = proto.source
-    target = _read("message", field.name)
-    zero = '""'
-    if isinstance(element, BasicType) and element.name in ("octet", *_LARGEST_CHARACTER):
-        if element.name == "octet":
-            to_custom, to_ros, zero = f"octets({checked})", f"ros_octets({received})", 'b"\\0"'
-        else:
-            largest = _LARGEST_CHARACTER[element.name]
-            to_custom, to_ros = f"characters({checked}, {largest})", f"ros_characters({received}, {largest})"
-            zero = '"\\0"'
-        to_custom_line = _assign(field.name, to_custom)
-    else:
-        convert, convert_back = _scalar(element)
-        checked = f"sequence({checked})"
-        if isinstance(element, BasicType):
-            zero = "False" if element.name == "boolean" else "0.0"
-        to_custom_line = f"{target}.extend({_each(convert, checked)})"
-        to_ros = _each(convert_back, received)
-    if isinstance(field.type, ArrayType):
-        to_ros = f"{to_ros} or [{zero}] * {field.type.size}"
-    return (to_custom_line,), (_assign(field.name, to_ros),)
-
-
-def _each(convert: str, values: str) -> str:
-    """Return the list of converted elements, where `convert` is a format with the element in it."""
-    if convert == "{}":
-        return f"list({values})"
-    if match := re.fullmatch(r"(\w+)\(\{\}\)", convert):
-        return f"each({match[1]}, {values})"
-    return f"each(lambda value: {convert.format('value')}, {values})"
-
-
-def _scalar(element: BasicType | StringType) -> tuple[str, str]:
-    """Return how one value is converted, to protobuf and to ROS, with `{}` for the value."""
-    if isinstance(element, StringType):
-        to_custom, to_ros = ("wide({})", "ros_wide({})") if element.wide else ("string({})", "ros_string({})")
-        if element.bound is None:
-            return to_custom, to_ros
-        return to_custom.format(f"text({{}}, {element.bound})"), f"text({to_ros}, {element.bound})"
-    if element.name in _NARROW_INTEGERS:
-        lowest, highest = element.scalar.range
-        check = f"in_range({{}}, {lowest}, {highest})"
-        return check, check
-    if element.name in _LARGEST_CHARACTER:
-        largest = _LARGEST_CHARACTER[element.name]
-        return f"character({{}}, {largest})", f"ros_character({{}}, {largest})"
-    return {
-        "octet": ("octet({})", "ros_octet({})"),
-        "float": ("float32({})", "{}"),
-        "boolean": ("boolean({})", "{}"),
-    }.get(element.name, ("{}", "{}"))
-
-
-def _checked(field_type: ArrayType | SequenceType, values: str, *, from_custom: bool) -> str:
-    """Return the values with a check of their number, where there is one."""
-    if isinstance(field_type, ArrayType):
-        return f"{'absent_or_exactly' if from_custom else 'exactly'}({values}, {field_type.size})"
-    return f"at_most({values}, {field_type.bound})" if field_type.bound else values
-
-
-def _read(owner: str, name: str) -> str:
-    return f'getattr({owner}, "{name}")' if keyword.iskeyword(name) else f"{owner}.{name}"
-
-
-def _assign(name: str, value: str) -> str:
-    if keyword.iskeyword(name):
-        return f'setattr(message, "{name}", {value})'
-    return f"message.{name} = {value}"
-
-
 # --- Default values and constants ---
 
 
-def _defaults(message: Message) -> str:
+def _defaults(proto: ProtoMessage) -> str:
     """Return the default values of a message as the Python text of a dictionary, in terms of protobuf."""
-    items = [
-        f"{each.name!r}: {_proto_literal(each.type, each.default)}"
-        for each in message.fields
-        if each.default is not None
-    ]
+    items = [f"{each.name!r}: {_literal(each.default)}" for each in proto.fields if each.default is not None]
     return "{" + ", ".join(items) + "}" if items else ""
 
 
@@ -615,81 +314,9 @@ def _has_defaults(message: Message, names: Names) -> bool:
     )
 
 
-def _proto_literal(field_type: FieldType, value: Value) -> str:
-    element = value_type(field_type)
+def _literal(value: ProtoValue) -> str:
     if isinstance(value, tuple):
-        if isinstance(element, BasicType) and element.name in ("octet", "uint8", "int8"):
-            return repr(bytes(int(each) & 0xFF for each in value))
-        if isinstance(element, BasicType) and element.name in _LARGEST_CHARACTER:
-            return repr("".join(chr(int(each)) for each in value))
-        return "[" + ", ".join(_proto_literal(element, each) for each in value) + "]"
-    if isinstance(element, StringType) and element.wide:
-        return repr(str(value).encode("utf-16-le"))
-    return _python_literal(value)
-
-
-def _python_literal(value: Value) -> str:
+        return "[" + ", ".join(map(_literal, value)) + "]"
     if isinstance(value, float) and not math.isfinite(value):
         return f'float("{value}")'
     return repr(value)
-
-
-# --- Type stubs ---
-
-_SCALAR_TYPES: Mapping[str, str] = {
-    "bool": "_builtins.bool",
-    "string": "_builtins.str",
-    "bytes": "_builtins.bytes",
-    "float": "_builtins.float",
-    "double": "_builtins.float",
-    **dict.fromkeys(("int32", "uint32", "fixed32", "sfixed32", "fixed64", "sfixed64"), "_builtins.int"),
-}
-
-
-def _stub(proto: ProtoMessage, interface: Interface, names: Names) -> StubMessage:
-    return StubMessage(
-        proto.name,
-        _docstring_lines(proto.comment),
-        tuple(
-            _stub_field(each, interface, names) for each in proto.fields if not keyword.iskeyword(each.name)
-        ),
-        tuple(each.name for each in proto.fields),
-        "_self" if any(each.name == "self" for each in proto.fields) else "self",
-    )
-
-
-def _stub_field(proto: ProtoField, interface: Interface, names: Names) -> StubField:
-    element = value_type(proto.source.type)
-    if isinstance(element, TypeName):
-        plain = element.name
-        if names.catalog.definition_name(element) != interface.name:
-            plain = f"{_stub_alias(names.module(element, 'pb2'))}.{element.name}"
-        read = f"_containers.RepeatedCompositeFieldContainer[{plain}]" if proto.repeated else plain
-        argument = f"_typing.Iterable[{plain}]" if proto.repeated else plain
-    else:
-        plain = _SCALAR_TYPES[proto.type]
-        read = f"_containers.RepeatedScalarFieldContainer[{plain}]" if proto.repeated else plain
-        argument = f"_typing.Iterable[{plain}]" if proto.repeated else plain
-    is_message = isinstance(element, TypeName) and not proto.repeated
-    return StubField(
-        proto.name,
-        not proto.repeated and not is_message,
-        is_message,
-        read,
-        argument,
-        _docstring_lines(proto.comment),
-    )
-
-
-def _stub_alias(module: str) -> str:
-    """Return what a module is called in a type stub: no field can be called so, as the package itself could be."""
-    return "_" + "_".join(module.split(".")[-3:])
-
-
-def _plain_lines(lines: Iterable[str]) -> tuple[str, ...]:
-    return tuple(part.rstrip() for line in lines for part in line.splitlines() or [""])
-
-
-def _docstring_lines(lines: Iterable[str]) -> tuple[str, ...]:
-    """Return lines that can stand in a docstring."""
-    return tuple(line.replace("\\", "\\\\").replace('"""', r"\"\"\"") for line in _plain_lines(lines))
