@@ -14,8 +14,9 @@ from pathlib import Path
 import pytest
 
 from rosidl_adapter_proto.errors import GenerateError
-from rosidl_adapter_proto.generate import layout
-from rosidl_adapter_proto.generate.layout import (
+from rosidl_adapter_proto.generate import output_tree
+from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, read_manifest
+from rosidl_adapter_proto.generate.output_tree import (
     STAGING_NAME,
     Changes,
     alone_in,
@@ -26,7 +27,6 @@ from rosidl_adapter_proto.generate.layout import (
     replace_file,
     write,
 )
-from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, read_manifest
 from tests.folders import content, times
 
 OLD = {"a": b"old a", "proto/p/b": b"old b", "proto/q/r/c": b"old c"}
@@ -328,7 +328,7 @@ def test_writing_in_a_thread(output: Path) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from rosidl_adapter_proto.generate.layout import make_manifest, write
+from rosidl_adapter_proto.generate.output_tree import make_manifest, write
 
 calls, last = 0, int(sys.argv[2])
 def counted(method):
@@ -405,7 +405,7 @@ def test_without_locks(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(descriptor: int, operation: int) -> None:
         raise OSError(errno.EBADF, "Bad file descriptor")
 
-    monkeypatch.setattr(layout.fcntl, "flock", refuse)
+    monkeypatch.setattr(output_tree.fcntl, "flock", refuse)
 
     put(output, NEW)
 

@@ -7,15 +7,15 @@ from pathlib import Path
 import click
 
 from rosidl_adapter_proto.cli.options import complete_name, source_options
-from rosidl_adapter_proto.generate.index import installed_packages
 from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.generate.targets.index import installed_packages
 from rosidl_adapter_proto.interfaces.find import prefixes
 
 
 @click.command("list")
 @click.argument("package", required=False, shell_complete=complete_name)
 @source_options
-def list_command(package: str | None, include: tuple[Path, ...], distro: str | None) -> None:
+def command(package: str | None, include: tuple[Path, ...], distro: str | None) -> None:
     """List the packages that are found and where, or the interfaces of one PACKAGE.
 
     A package whose protobuf types and adapters are installed is listed with their place, too.

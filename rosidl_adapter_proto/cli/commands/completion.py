@@ -9,7 +9,7 @@ from click.shell_completion import get_completion_class
 @click.command("completion")
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 @click.pass_context
-def completion_command(context: click.Context, shell: str) -> None:
+def command(context: click.Context, shell: str) -> None:
     """Print the script that gives a shell completion: eval "$(rosidl-proto completion bash)"."""
     completion_class = get_completion_class(shell)
     assert completion_class is not None  # one of the choices

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from rosidl_adapter_proto.errors import GenerateError
-from rosidl_adapter_proto.generate.layout import replace_file
+from rosidl_adapter_proto.generate.output_tree import replace_file
 from rosidl_adapter_proto.generate.render import templates_folder
 
 CMAKE_PACKAGE = "rosidl_generator_proto"

@@ -10,44 +10,32 @@ from typing import Any
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_name, schema_options, source_options
+from rosidl_adapter_proto.cli.options import (
+    complete_name,
+    generate_options,
+    setting_option,
+    source_options,
+)
 from rosidl_adapter_proto.generate import Options, Progress, Result, generate
-from rosidl_adapter_proto.generate.configuration import OUTPUT_NAME
 from rosidl_adapter_proto.generate.request import find_request
+from rosidl_adapter_proto.generate.settings import OPTIONS
 
 
 @click.command("generate")
 @click.argument("what", nargs=-1, metavar="WHAT...", shell_complete=complete_name)
-@click.option(
-    "--output",
-    "-o",
-    type=click.Path(path_type=Path),
-    default=Path(OUTPUT_NAME),
-    show_default=True,
-    help="The folder to write. It holds what the last run made, and nothing older.",
-)
-@click.option("--deps/--no-deps", default=True, help="Generate the packages that WHAT depends on, too.")
-@schema_options
-@click.option(
-    "--python-root",
-    default="rosidl_proto",
-    show_default=True,
-    metavar="NAME",
-    help="The namespace package of the generated Python packages.",
-)
+@setting_option("output")
+@setting_option("deps")
+@generate_options(OPTIONS)
 @click.option("--check", is_flag=True, help="Write nothing; exit with 1 and a list if anything is stale.")
 @click.option("--verbose", "-v", is_flag=True, help="List every file and where definitions come from.")
 @source_options
 @click.pass_context
-def generate_command(
+def command(
     context: click.Context,
     what: tuple[str, ...],
     output: Path,
     deps: bool,
-    numbering: str,
-    lock_file: Path,
-    events: bool,
-    python_root: str,
+    options: Options,
     check: bool,
     verbose: bool,
     include: tuple[Path, ...],
@@ -64,7 +52,6 @@ def generate_command(
             "Missing argument 'WHAT...': name a package, or set `packages` in the configuration."
         )
     request, catalog = find_request(what, include, distro, deps)
-    options = Options(numbering, lock_file, events, python_root)
     with _progress() as progress:
         result = generate(request, catalog, output, options, check=check, progress=progress)
     for warning in result.warnings:
@@ -73,9 +60,9 @@ def generate_command(
         for name in result.interfaces:
             click.echo(f"{name} from {catalog.definition(name).file}")
     if check:
-        return _report_check(result, output, lock_file)
+        return _report_check(result, output, options.lock_file)
     if verbose:
-        _list_files(result, output, lock_file, "wrote", "removed")
+        _list_files(result, output, options.lock_file, "wrote", "removed")
     changes = result.changes
     counts = f"{len(changes.written)} written, {len(changes.removed)} removed, {changes.unchanged} unchanged"
     number = len(result.interfaces)

@@ -150,6 +150,37 @@ def discard_left_over(output: Path) -> None:
             _remove_folder(output / STAGING_NAME)
 
 
+def install(output: Path, prefix: Path, places: Mapping[str, str]) -> None:
+    """Copy what was generated to a prefix. Builds that run at the same time may install the same files.
+
+    Args:
+        output: An output folder; nothing is installed of one that was never written.
+        prefix: The prefix; it is made if need be.
+        places: Where each folder of the output goes in the prefix.
+
+    Raises:
+        GenerateError: Files cannot be written.
+    """
+    manifest = read_manifest(output)
+    try:
+        prefix.mkdir(parents=True, exist_ok=True)
+        with alone_in(prefix):
+            for path in manifest.outputs if manifest else ():
+                folder, _, rest = path.partition("/")
+                if folder in places:
+                    _install_file(output / path, prefix / places[folder] / rest)
+    except OSError as error:
+        raise GenerateError(f"cannot write to {prefix}: {error.strerror} ({error.filename})") from None
+
+
+def _install_file(file: Path, place: Path) -> None:
+    content = file.read_bytes()
+    if not place.is_file() or place.read_bytes() != content:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.unlink(missing_ok=True)  # a link of `--symlink-install` leads into the folder of another build
+        replace_file(place, content)
+
+
 def replace_file(file: Path, content: bytes) -> None:
     """Write a single file, all of it or not at all.
 

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate.manifest import digest
-from rosidl_adapter_proto.generate.request import Options
+from rosidl_adapter_proto.generate.settings import Options
+from rosidl_adapter_proto.generate.targets import Files, Generation
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.model import TypeName
 
-SHARED_FOLDERS = {"proto": "share", "index": "share/ament_index/resource_index"}
-"""Where the folders of an output folder that are not Python's go in a prefix."""
-
+PLACE = "share/ament_index/resource_index"
+"""Where the ament index is in a prefix."""
 RESOURCE_TYPE = "rosidl_proto"
-RESOURCE_FOLDER = f"{SHARED_FOLDERS['index']}/{RESOURCE_TYPE}"
+RESOURCE_FOLDER = f"{PLACE}/{RESOURCE_TYPE}"
 
 
 @dataclass(frozen=True)
@@ -31,20 +32,27 @@ class GeneratedPackage:
     Attributes:
         interfaces: The number of its interfaces.
         definitions: A digest of their definitions.
-        numbering: How fields are numbered: `hash` or `sequential`.
-        events: Whether services have their `_Event` messages.
-        python_root: The namespace package that its Python package is in.
+        options: The options that change the output.
     """
 
     interfaces: int
     definitions: str
-    numbering: str
-    events: bool
-    python_root: str
+    options: Mapping[str, Any]
 
     def to_json(self) -> bytes:
         """Return the content of the resource."""
-        return (json.dumps(asdict(self), indent=1) + "\n").encode()
+        facts = {"interfaces": self.interfaces, "definitions": self.definitions, **self.options}
+        return (json.dumps(facts, indent=1) + "\n").encode()
+
+    @classmethod
+    def from_json(cls, content: bytes) -> GeneratedPackage:
+        """Return what a resource says.
+
+        Raises:
+            ValueError, TypeError, KeyError: It is none, or one of another version.
+        """
+        facts = {**json.loads(content)}
+        return cls(options={name: facts.pop(name) for name in Options().changing_output()}, **facts)
 
 
 @dataclass(frozen=True)
@@ -68,12 +76,17 @@ def generated_packages(
             digest(
                 "".join(f"{each}\n{_essence(catalog.definition(each).text)}" for each in interfaces).encode()
             ),
-            options.numbering,
-            options.events,
-            options.python_root,
+            options.changing_output(),
         )
         for package, interfaces in by_package.items()
     }
+
+
+def resource_files(generation: Generation) -> Files:
+    """Return the resource of each package that is generated."""
+    names = (file.source.name for file in generation.files)
+    packages = generated_packages(names, generation.catalog, generation.options)
+    return {f"{RESOURCE_TYPE}/{name}": each.to_json() for name, each in packages.items()}
 
 
 def _essence(text: str) -> str:
@@ -89,10 +102,10 @@ def installed_package(prefix: Path, name: str) -> GeneratedPackage | None:
     """
     file = prefix / RESOURCE_FOLDER / name
     try:
-        return GeneratedPackage(**json.loads(file.read_bytes()))
+        return GeneratedPackage.from_json(file.read_bytes())
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, KeyError) as error:
         raise GenerateError(
             f"{file} is not a resource that this version of rosidl-proto reads ({error}); "
             "install its package again, or remove the file"

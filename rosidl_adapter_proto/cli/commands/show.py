@@ -7,29 +7,23 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import complete_name, schema_options, source_options
+from rosidl_adapter_proto.cli.options import complete_name, generate_options, source_options
 from rosidl_adapter_proto.generate import Options, proto_text
 from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.generate.settings import OPTIONS
 
 
 @click.command("show")
 @click.argument("type_name", metavar="TYPE", shell_complete=complete_name)
-@schema_options
+@generate_options(each for each in OPTIONS if each.is_for_schema)
 @source_options
-def show_command(
-    type_name: str,
-    numbering: str,
-    lock_file: Path,
-    events: bool,
-    include: tuple[Path, ...],
-    distro: str | None,
-) -> None:
+def command(type_name: str, options: Options, include: tuple[Path, ...], distro: str | None) -> None:
     """Show the definition of TYPE (std_msgs/msg/String) and the .proto made of it, side by side."""
     if "/" not in type_name:
         raise click.UsageError(f"{type_name!r} is not the name of a type, such as std_msgs/msg/String")
     catalog = find_catalog(include, distro)
     definition = catalog.definition(catalog.full_name(type_name))
-    proto = proto_text(definition.name, catalog, Options(numbering, lock_file, events))
+    proto = proto_text(definition.name, catalog, options)
     click.echo(f"{definition.name} from {definition.file}")
     click.echo(f"type hash {catalog.hash(definition.name)}\n")
     left = definition.text.expandtabs(4).splitlines()
