@@ -2,7 +2,7 @@
 // many messages; a mark says where in it those of one message begin.
 #pragma once
 
-#include "../transcode.hpp"
+#include <rosidl_adapter_proto/transcode.hpp>
 
 namespace rosidl_proto {
 

@@ -8,7 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "../packed_fields.hpp"
+#include <rosidl_adapter_proto/packed_fields.hpp>
+
 #include "batch.hpp"
 
 namespace nb = nanobind;

@@ -14,7 +14,7 @@ enum class Reason : uint8_t {
   Truncated,
   Header,
   Encapsulation,
-  CdrBool,
+  CdrValue,
   NoTerminator,
   WstringUnit,
   Trailing,
@@ -27,10 +27,7 @@ enum class Reason : uint8_t {
   WirePacked,
   WireSize,
   ArrayLength,
-  NotUint8,
-  NotInt8,
-  NotUint16,
-  NotInt16,
+  Range,
   NulInString,
   OddWstring,
   // of both
@@ -41,10 +38,9 @@ enum class Reason : uint8_t {
   Count,
   TooLarge,
   OutOfMemory,
+  Partial,
   Changed,
 };
-constexpr unsigned kReasons = static_cast<unsigned>(Reason::Changed) + 1;
-
 constexpr int64_t kNoElement = -1;
 
 struct Error {

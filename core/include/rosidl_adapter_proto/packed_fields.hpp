@@ -1,9 +1,10 @@
-// Finds packed repeated fields in a message as protobuf runtimes serialize it: each at most once, and no groups.
+// Finds packed repeated fields in a message as protobuf runtimes serialize it: each at most once, and no
+// groups.
 #pragma once
 
 #include <cstddef>
 
-#include "bytes.hpp"
+#include "wire.hpp"
 
 namespace rosidl_proto {
 

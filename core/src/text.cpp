@@ -1,6 +1,6 @@
 #include "text.hpp"
 
-#include "bytes.hpp"
+#include "rosidl_adapter_proto/wire.hpp"
 
 namespace rosidl_proto {
 

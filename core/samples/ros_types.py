@@ -1,4 +1,4 @@
-"""What the tests of the transcoder share: types, protobuf classes made from them, and values in every form.
+"""What tests and fuzzing of the transcoder share: types, protobuf classes made from them, and values in every form.
 
 A value of a message is a dictionary; from it come the ROS object, the protobuf message and CDR, each in its own way.
 """
@@ -339,6 +339,9 @@ def nasty_types() -> Types:
         "uint16",
         "int16",
         "uint32",
+        "int32",
+        "float",
+        "uint64",
         "int64",
         "double",
     )
