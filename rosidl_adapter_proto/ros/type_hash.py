@@ -9,13 +9,15 @@ import json
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
-from rclpy.impl.rcutils_logger import RcutilsLogger
-from rclpy.node import Node
 
 from rosidl_adapter_proto.errors import Error
+
+if TYPE_CHECKING:
+    from rclpy.impl.rcutils_logger import RcutilsLogger
+    from rclpy.node import Node
 
 
 class TypeHashError(Error):
