@@ -122,14 +122,10 @@ void run_on_threads(size_t threads, size_t count, Work work) {
 
 class Transcoder {
  public:
-  Transcoder(nb::bytes plan, std::string type_name, uint64_t size_limit, nb::object message_class)
-      : type_name_(std::move(type_name)), size_limit_(size_limit), message_class_(std::move(message_class)) {
+  Transcoder(nb::bytes plan, std::string type_name, uint64_t size_limit)
+      : type_name_(std::move(type_name)), size_limit_(size_limit) {
     const char* wrong = plan_.load(static_cast<const uint8_t*>(plan.data()), plan.size());
     if (wrong != nullptr) throw nb::value_error(wrong);
-    if (message_class_.is_none()) return;
-    from_string_ = message_class_.attr("FromString");
-    // The method of the class: protobuf looks every name up among the fields of a message first.
-    serialize_ = message_class_.attr("SerializeToString");
   }
 
   const std::string& type_name() const { return type_name_; }
@@ -162,25 +158,6 @@ class Transcoder {
     }
     if (!good) fail(error, nb::none());
     return result;
-  }
-
-  // The same from and to message objects. Python would do it in two lines, at twice the cost for small messages.
-  static nb::object message_to_cdr(nb::handle_t<Transcoder> self, nb::handle message) {
-    const Transcoder& transcoder = nb::cast<const Transcoder&>(self);
-    if (reinterpret_cast<PyObject*>(Py_TYPE(message.ptr())) != transcoder.message_class_.ptr())
-      self.attr("refuse")(message);
-    const nb::object proto =
-        nb::steal(PyObject_CallOneArg(transcoder.serialize_.ptr(), message.ptr()));
-    if (!proto.is_valid()) throw nb::python_error();
-    return transcoder.transcode<ProtoToCdr>(proto);
-  }
-
-  nb::object cdr_to_message(nb::handle data) const {
-    if (!from_string_.is_valid()) throw nb::type_error("this transcoder has no message class");
-    const nb::object proto = transcode<CdrToProto>(data);
-    nb::object message = nb::steal(PyObject_CallOneArg(from_string_.ptr(), proto.ptr()));
-    if (!message.is_valid()) throw nb::python_error();
-    return message;
   }
 
   template <class Direction>
@@ -265,6 +242,38 @@ class Transcoder {
   Plan plan_;
   std::string type_name_;
   uint64_t size_limit_;
+};
+
+// The two directions from and to message objects. Python would do it in two lines, at twice the cost for small
+// messages.
+class Codec {
+ public:
+  Codec(nb::handle_t<Transcoder> transcoder, nb::object message_class)
+      : owner_(nb::borrow(transcoder)),
+        transcoder_(nb::cast<const Transcoder&>(transcoder)),
+        message_class_(std::move(message_class)),
+        from_string_(message_class_.attr("FromString")),
+        // The method of the class: protobuf looks every name up among the fields of a message first.
+        serialize_(message_class_.attr("SerializeToString")) {}
+
+  nb::object to_cdr(nb::handle self, nb::handle message) const {
+    if (reinterpret_cast<PyObject*>(Py_TYPE(message.ptr())) != message_class_.ptr()) self.attr("_refuse")(message);
+    return transcoder_.transcode<ProtoToCdr>(call(serialize_, message));
+  }
+
+  nb::object from_cdr(nb::handle, nb::handle data) const {
+    return call(from_string_, transcoder_.transcode<CdrToProto>(data));
+  }
+
+ private:
+  static nb::object call(nb::handle function, nb::handle argument) {
+    nb::object result = nb::steal(PyObject_CallOneArg(function.ptr(), argument.ptr()));
+    if (!result.is_valid()) throw nb::python_error();
+    return result;
+  }
+
+  nb::object owner_;
+  const Transcoder& transcoder_;  // of the owner
   nb::object message_class_, from_string_, serialize_;
 };
 
@@ -289,6 +298,62 @@ nb::tuple packed_fields(nb::handle serialize, nb::handle object, nb::args number
   return nb::borrow<nb::tuple>(result);
 }
 
+// The object behind `self`. It is missing where a class derives from ours and does not call its `__init__`.
+template <class T>
+const T& self_as(PyObject* self) {
+  if (!nb::inst_ready(self)) throw nb::type_error("__init__ of the base class has not been called");
+  return *nb::inst_ptr<T>(self);
+}
+
+// Runs C++ that CPython calls: what it throws becomes the exception of Python.
+template <class Function>
+PyObject* called_from_python(Function function) noexcept {
+  try {
+    return function().release().ptr();
+  } catch (nb::python_error& error) {
+    error.restore();
+  } catch (const nb::builtin_exception& error) {
+    PyErr_SetString(PyExc_TypeError, error.what());
+  } catch (const std::bad_alloc&) {
+    PyErr_NoMemory();
+  } catch (const std::exception& error) {
+    PyErr_SetString(PyExc_RuntimeError, error.what());
+  }
+  return nullptr;
+}
+
+template <class Direction>
+PyObject* transcode(PyObject* self, PyObject* data) {
+  return called_from_python([&] { return self_as<Transcoder>(self).transcode<Direction>(data); });
+}
+
+PyObject* codec_to_cdr(PyObject* self, PyObject* message) {
+  return called_from_python([&] { return self_as<Codec>(self).to_cdr(self, message); });
+}
+
+PyObject* codec_from_cdr(PyObject* self, PyObject* data) {
+  return called_from_python([&] { return self_as<Codec>(self).from_cdr(self, data); });
+}
+
+// Methods as CPython itself has them: the cheapest to call, and unlike those of nanobind they have signatures
+// for `inspect` and can be pickled.
+PyMethodDef transcoder_methods[] = {
+    {"cdr_to_proto", transcode<CdrToProto>, METH_O,
+     "cdr_to_proto($self, data, /)\n--\n\nTurn a serialized ROS message into a serialized protobuf message."},
+    {"proto_to_cdr", transcode<ProtoToCdr>, METH_O,
+     "proto_to_cdr($self, data, /)\n--\n\nTurn a serialized protobuf message into a serialized ROS message."},
+    {nullptr, nullptr, 0, nullptr}};
+PyType_Slot transcoder_slots[] = {{Py_tp_methods, transcoder_methods}, {0, nullptr}};
+
+PyMethodDef codec_methods[] = {
+    {"to_cdr", codec_to_cdr, METH_O,
+     "to_cdr($self, message, /)\n--\n\nTurn a protobuf message into a serialized ROS message."},
+    {"from_cdr", codec_from_cdr, METH_O,
+     "from_cdr($self, data, /)\n--\n\nTurn a serialized ROS message into a protobuf message."},
+    {"__class_getitem__", Py_GenericAlias, METH_O | METH_CLASS, "Codec[MessageT] is Codec."},
+    {nullptr, nullptr, 0, nullptr}};
+PyType_Slot codec_slots[] = {{Py_tp_methods, codec_methods}, {0, nullptr}};
+
 }  // namespace
 }  // namespace rosidl_proto
 
@@ -299,20 +364,14 @@ NB_MODULE(_core, module) {
   nb::set_leak_warnings(false);
   module.def("packed_fields", &packed_fields, nb::arg("serialize"), nb::arg("message"), nb::arg("numbers"),
              "Return the bytes of packed repeated fields of a message, by their numbers.");
-  nb::class_<Transcoder>(module, "Transcoder")
-      .def(nb::init<nb::bytes, std::string, uint64_t, nb::object>(), nb::arg("plan"), nb::arg("type_name"),
-           nb::arg("size_limit"), nb::arg("message_class") = nb::none())
-      .def("message_to_cdr", &Transcoder::message_to_cdr, nb::arg("source").none(),
-           "Turn a protobuf message into a serialized ROS message.")
-      .def("cdr_to_message", &Transcoder::cdr_to_message, nb::arg("data").none(),
-           "Turn a serialized ROS message into a protobuf message.")
+  nb::class_<Transcoder>(module, "Transcoder", nb::type_slots(transcoder_slots))
+      .def(nb::init<nb::bytes, std::string, uint64_t>(), nb::arg("plan"), nb::arg("type_name"),
+           nb::arg("size_limit"))
       .def_prop_ro("type_name", &Transcoder::type_name, "The ROS type, such as `sensor_msgs/msg/Imu`.")
-      .def("cdr_to_proto", &Transcoder::transcode<CdrToProto>, nb::arg("data").none(),
-           "Turn a serialized ROS message into a serialized protobuf message.")
-      .def("proto_to_cdr", &Transcoder::transcode<ProtoToCdr>, nb::arg("data").none(),
-           "Turn a serialized protobuf message into a serialized ROS message.")
       .def("cdr_to_proto_batch", &Transcoder::transcode_batch<CdrToProto>, nb::arg("messages"),
            nb::arg("threads") = 1, "Do `cdr_to_proto` for each message, on a number of threads.")
       .def("proto_to_cdr_batch", &Transcoder::transcode_batch<ProtoToCdr>, nb::arg("messages"),
            nb::arg("threads") = 1, "Do `proto_to_cdr` for each message, on a number of threads.");
+  nb::class_<Codec>(module, "Codec", nb::type_slots(codec_slots))
+      .def(nb::init<nb::handle_t<Transcoder>, nb::object>(), nb::arg("transcoder"), nb::arg("message_class"));
 }

@@ -72,7 +72,7 @@ def create_subscription(
         return node.create_subscription(ros_type, topic, callback, qos_profile, raw=raw, **options)
 
     def explain() -> str:
-        others = publishers_of_other_versions(node, topic, adapter.type_hash)
+        others = publishers_of_other_versions(node, topic, adapter)
         return f"; publishers with another version of the type: {', '.join(others)}" if others else ""
 
     from_cdr = codec_of(adapter).from_cdr

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic
 
 from rosidl_adapter_proto.adapter import CustomT, RequestT, ResponseT, ServiceAdapter
+from rosidl_adapter_proto.adapter.lazy import name_of
 from rosidl_adapter_proto.errors import ConversionError
 from rosidl_adapter_proto.ros.conversion import to_ros_message
 
@@ -97,7 +98,7 @@ def service_callback(
         return None if custom_request is None else (custom_request, adapter.response.new())
 
     def finish(response: Any) -> Any:
-        return to_ros_message(adapter.response, response, f"the response of {adapter.type_name}")
+        return to_ros_message(adapter.response, response, f"the response of {name_of(adapter)}")
 
     return converting_callback(callback, accept, finish, NO_RESPONSE)
 

@@ -467,7 +467,7 @@ def test_publishers_of_other_versions_are_named(adapter: Any) -> None:
     node: Any = SimpleNamespace(
         get_publishers_info_by_topic=lambda topic: endpoints, resolve_topic_name=lambda topic: topic
     )
-    assert publishers_of_other_versions(node, "/topic", adapter.type_hash) == ["/old/robot (RIHS01_00)"]
+    assert publishers_of_other_versions(node, "/topic", adapter) == ["/old/robot (RIHS01_00)"]
 
 
 def test_an_error_of_a_callback_reaches_the_executor(ros: None, adapter: Any, text: Any) -> None:
