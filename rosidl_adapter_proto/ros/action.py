@@ -88,8 +88,6 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
         action_type: type[RosAction],
         action_name: str,
         execute_callback: Callable[[Any], Any],
-        *,
-        on_conversion_error: OnConversionError | None = None,
         **options: Any,
     ) -> None: ...
 
@@ -233,8 +231,6 @@ class ActionClient(ConvertingActionClient, Generic[GoalT, ResultT, FeedbackT]):
         node: rclpy.node.Node,
         action_type: type[RosAction],
         action_name: str,
-        *,
-        on_conversion_error: OnConversionError | None = None,
         **options: Any,
     ) -> None: ...
 
