@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, Generic, overload
 import rclpy.action.client
 import rclpy.action.server
 import rclpy.node
+from rclpy.action.server import CancelResponse, GoalResponse
 
 from rosidl_adapter_proto.adapter import ActionAdapter, FeedbackT, GoalT, ResultT
 from rosidl_adapter_proto.ros.adapters import ACTION, RosAction, RosMessage, resolve
-from rosidl_adapter_proto.ros.conversion import to_ros_message
 from rosidl_adapter_proto.ros.inbound import OnConversionError, Reception, converting_callback
+from rosidl_adapter_proto.ros.outbound import to_ros_message
 from rosidl_adapter_proto.ros.rclpy_internals import ConvertingActionClient, convert_in
 
 if TYPE_CHECKING:
@@ -56,6 +57,12 @@ if TYPE_CHECKING:
     ]
     """Takes the handle of a goal and returns the result; or is a coroutine function that does."""
 
+    GoalCallback = Callable[[GoalT], GoalResponse | Coroutine[Any, Any, GoalResponse]]
+    HandleAcceptedCallback = Callable[[ServerGoalHandle[GoalT, ResultT, FeedbackT]], object]
+    CancelCallback = Callable[
+        [ServerGoalHandle[GoalT, ResultT, FeedbackT]], CancelResponse | Coroutine[Any, Any, CancelResponse]
+    ]
+
 
 class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, FeedbackT]):
     """An action server with protobuf messages.
@@ -77,6 +84,9 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
         action_name: str,
         execute_callback: ExecuteCallback[GoalT, ResultT, FeedbackT],
         *,
+        goal_callback: GoalCallback[GoalT] = ...,
+        handle_accepted_callback: HandleAcceptedCallback[GoalT, ResultT, FeedbackT] = ...,
+        cancel_callback: CancelCallback[GoalT, ResultT, FeedbackT] = ...,
         on_conversion_error: OnConversionError | None = None,
         **options: Any,
     ) -> None: ...
@@ -168,7 +178,7 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
             goal = self._reception(ros_goal)
             return None if goal is None else (goal,)
 
-        return converting_callback(callback, accept, dropped=rclpy.action.server.GoalResponse.REJECT)
+        return converting_callback(callback, accept, dropped=GoalResponse.REJECT)
 
     def _handle_callback_of_rclpy(self, callback: Callable[..., Any]) -> Callable[..., Any]:
         return converting_callback(callback, self._converting)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rosidl_adapter_proto.ros.adapters import MESSAGE, SERVICE, resolve
-from rosidl_adapter_proto.ros.conversion import codec_of
 from rosidl_adapter_proto.ros.entities import (
     Client,
     LifecyclePublisher,
@@ -46,8 +45,13 @@ def _publishing(publisher: Any, publisher_class: type[Publisher[Any]], adapter: 
         publisher_class,
         adapter=adapter,
         _custom_type=adapter.custom_type,
-        _to_cdr=codec_of(adapter).to_cdr,
+        _to_cdr=_codec(adapter).to_cdr,
     )
+
+
+def _codec(adapter: Any) -> Any:
+    """Return what has the methods `to_cdr` and `from_cdr`: the codec, or without one the adapter, which asks rclpy."""
+    return adapter.codec or adapter
 
 
 def create_subscription(
@@ -75,7 +79,7 @@ def create_subscription(
         others = publishers_of_other_versions(node, topic, adapter)
         return f"; publishers with another version of the type: {', '.join(others)}" if others else ""
 
-    from_cdr = codec_of(adapter).from_cdr
+    from_cdr = _codec(adapter).from_cdr
     reception = Reception(node.get_logger(), f"topic {topic}", from_cdr, on_conversion_error, explain, bytes)
     subscription = node.create_subscription(
         ros_type, topic, reception.callback(callback), qos_profile, raw=True, **options

@@ -14,8 +14,8 @@ import rclpy.task
 
 from rosidl_adapter_proto.adapter import CustomT, RequestT, ResponseT, ServiceAdapter, TypeAdapter
 from rosidl_adapter_proto.ros.adapters import RosMessage
-from rosidl_adapter_proto.ros.conversion import to_ros_message, wrong_type
 from rosidl_adapter_proto.ros.inbound import NO_RESPONSE, Reception, service_callback
+from rosidl_adapter_proto.ros.outbound import to_ros_message, wrong_type
 from rosidl_adapter_proto.ros.rclpy_internals import (
     callback_of_service,
     convert_result,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic
 from rosidl_adapter_proto.adapter import CustomT, RequestT, ResponseT, ServiceAdapter
 from rosidl_adapter_proto.adapter.lazy import name_of
 from rosidl_adapter_proto.errors import ConversionError
-from rosidl_adapter_proto.ros.conversion import to_ros_message
+from rosidl_adapter_proto.ros.outbound import to_ros_message
 
 if TYPE_CHECKING:
     from rclpy.impl.rcutils_logger import RcutilsLogger

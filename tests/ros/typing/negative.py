@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rclpy.action.server import CancelResponse, GoalResponse
 from rosidl_proto.std_msgs.msg import Int8, String, StringAdapter
 from rosidl_proto.std_srvs.srv import (
     SetBool_Request,
@@ -98,6 +99,26 @@ def execute_with_nested_result(goal_handle: Handle) -> NestedMessage_Result:
     return NestedMessage_Result()
 
 
+def accept_nested(goal: NestedMessage_Goal) -> GoalResponse:
+    return GoalResponse.ACCEPT
+
+
+def accept_with_bool(goal: Fibonacci_Goal) -> bool:
+    return True
+
+
+def on_accepted_nested(goal_handle: NestedHandle) -> None:
+    pass
+
+
+def cancel_nested(goal_handle: NestedHandle) -> CancelResponse:
+    return CancelResponse.ACCEPT
+
+
+def execute(goal_handle: Handle) -> Fibonacci_Result:
+    return Fibonacci_Result()
+
+
 def publish(node: Node, mixed: NodeMixin) -> None:
     node.create_publisher(StringAdapter, "chatter", 10).publish(Int8())  # error
     node.create_publisher(String, "chatter", 10).publish(Int8())  # error
@@ -159,6 +180,10 @@ def act(node: Node) -> None:
     ActionServer(node, FibonacciAdapter, "fibonacci", execute_nested)  # error
     ActionServer(node, FibonacciAdapter, "fibonacci", execute_with_nested_result)  # error
     ActionServer(node, Fibonacci_Goal, "fibonacci", execute_nested)  # error
+    ActionServer(node, FibonacciAdapter, "fibonacci", execute, goal_callback=accept_nested)  # error
+    ActionServer(node, FibonacciAdapter, "fibonacci", execute, goal_callback=accept_with_bool)  # error
+    ActionServer(node, FibonacciAdapter, "f", execute, handle_accepted_callback=on_accepted_nested)  # error
+    ActionServer(node, FibonacciAdapter, "fibonacci", execute, cancel_callback=cancel_nested)  # error
     ActionServer(node, SetBoolAdapter, "fibonacci", execute_nested)  # error
     ActionClient(node, FibonacciAdapter, "fibonacci").send_goal_async(NestedMessage_Goal())  # error
     ActionClient(node, FibonacciAdapter, "fibonacci").send_goal(NestedMessage_Goal())  # error

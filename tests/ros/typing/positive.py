@@ -13,6 +13,7 @@ import rclpy.subscription
 import std_msgs.msg  # type: ignore[import-untyped]
 import std_srvs.srv  # type: ignore[import-untyped]
 import test_msgs.action  # type: ignore[import-untyped]
+from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.subscription import MessageInfo
 from rosidl_proto.std_msgs.msg import String, StringAdapter
 from rosidl_proto.std_srvs.srv import SetBool_Request, SetBool_Response, SetBoolAdapter
@@ -105,6 +106,19 @@ class Talker(Node):
     ) -> Fibonacci_Result:
         return Fibonacci_Result()
 
+    def on_goal(self, goal: Fibonacci_Goal) -> GoalResponse:
+        return GoalResponse.ACCEPT if goal.order < 10 else GoalResponse.REJECT
+
+    def on_accepted(
+        self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
+    ) -> None:
+        goal_handle.execute()
+
+    async def on_cancel(
+        self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
+    ) -> CancelResponse:
+        return CancelResponse.ACCEPT
+
     def execute(
         self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
     ) -> Fibonacci_Result:
@@ -142,7 +156,16 @@ def check_what_a_request_or_a_goal_tells(talker: Talker) -> None:
     assert_type(known.call(SetBool_Request()), SetBool_Response | None)
     server = ActionServer(talker, Fibonacci_Goal, "fibonacci", talker.execute)
     assert_type(server, ActionServer[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback])
-    ActionServer(talker, FibonacciAdapter, "fibonacci", talker.execute_later)
+    ActionServer(
+        talker,
+        FibonacciAdapter,
+        "fibonacci",
+        talker.execute_later,
+        goal_callback=talker.on_goal,
+        handle_accepted_callback=talker.on_accepted,
+        cancel_callback=talker.on_cancel,
+        result_timeout=20,
+    )
     client = ActionClient(talker, Fibonacci_Goal, "fibonacci")
     assert_type(client, ActionClient[Fibonacci_Goal, Any, Any])
 

@@ -1,19 +1,11 @@
-"""The way from protobuf messages to what rclpy sends."""
+"""What goes out: a protobuf message becomes a ROS message, and anything else is refused."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rosidl_adapter_proto.adapter import CustomT, TypeAdapter
+from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.adapter.lazy import name_of
-
-if TYPE_CHECKING:
-    from rosidl_adapter_proto.transcode.codec import Codec
-
-
-def codec_of(adapter: type[TypeAdapter[CustomT, Any]]) -> Codec[CustomT] | type[TypeAdapter[CustomT, Any]]:
-    """Return what has the methods `to_cdr` and `from_cdr`: the codec, or the adapter, which then goes through rclpy."""
-    return adapter.codec or adapter
 
 
 def to_ros_message(adapter: type[TypeAdapter[Any, Any]], message: Any, what: str) -> Any:
