@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SchemaError,
     )
     from rosidl_adapter_proto.schema.numbering import compute_proto_field_number
+    from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
     from rosidl_adapter_proto.schema.typemap import (
         MSG_TYPE_TO_PROTO,
         PROTO_ACTION_GET_RESULT_CALL_NAME,
@@ -38,13 +39,15 @@ __all__ = [
     "Error",
     "GenerateError",
     "RequestError",
+    "Schema",
     "SchemaError",
+    "TypeRegistry",
     "compute_proto_field_number",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    for module in ("errors", "schema.typemap", "schema.numbering"):
+    for module in ("errors", "schema.typemap", "schema.numbering", "schema.registry"):
         if name in __all__ and hasattr(imported := importlib.import_module(f"{__name__}.{module}"), name):
             return getattr(imported, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

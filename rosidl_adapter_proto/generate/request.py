@@ -13,11 +13,9 @@ from rosidl_adapter_proto.interfaces.find import (
     Source,
     file_source,
     folder_source,
-    prefix_sources,
-    store_source,
+    installed_sources,
 )
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME
 
 
 @dataclass(frozen=True)
@@ -35,27 +33,10 @@ class Request:
     dependencies: bool = True
 
 
-@dataclass(frozen=True)
-class Options:
-    """How to generate.
-
-    Attributes:
-        numbering: How fields are numbered: `hash` or `sequential`.
-        lock_file: Where sequential numbers are kept.
-        events: Whether services get their `_Event` messages.
-        python_root: The namespace package that the generated packages are in.
-    """
-
-    numbering: str = "hash"
-    lock_file: Path = Path(LOCK_FILE_NAME)
-    events: bool = False
-    python_root: str = "rosidl_proto"
-
-
 def find_catalog(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Catalog:
     """Return every source in the order they win: `first`, included folders, ROS installations, the store."""
     folders = [folder_source(_existing(path)) for path in include]
-    return Catalog((*first, *folders, *prefix_sources(), store_source(distro)))
+    return Catalog((*first, *folders, *installed_sources(distro)))
 
 
 def find_request(

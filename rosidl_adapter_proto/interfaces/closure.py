@@ -30,6 +30,44 @@ def closure(
     partial = {name.package for name in single} - set(whole)
     order: dict[TypeName, None] = {}
     missing: dict[str, list[str]] = {}
+    queue = [name for package in whole for name in catalog.package(package)]
+    queue += [catalog.definition(name).name for name in single]
+    complete = set(whole)
+    while queue:
+        _order_by_need(queue, _interface_needs(catalog, events, missing), order)
+        needed_packages = {name.package for name in order} - complete - partial
+        complete |= needed_packages
+        queue = [name for package in sorted(needed_packages) for name in catalog.package(package)]
+    if missing:
+        raise _missing_error(catalog, missing)
+    return list(order)
+
+
+def type_closure(catalog: Catalog, name: TypeName, *, events: bool = False) -> list[TypeName]:
+    """Return an interface and every one that it refers to, dependencies first.
+
+    Args:
+        catalog: Where to look.
+        name: The interface, or a part of it.
+        events: Whether services have their `_Event` messages.
+
+    Raises:
+        DefinitionError: A type is missing (all of them are named), or messages contain each other.
+    """
+    order: dict[TypeName, None] = {}
+    missing: dict[str, list[str]] = {}
+    _order_by_need([catalog.definition_name(name)], _interface_needs(catalog, events, missing), order)
+    if missing:
+        raise _missing_error(catalog, missing)
+    return list(order)
+
+
+_Needs = Callable[[TypeName], Iterator[tuple[TypeName, str]]]
+"""Gives each type that one needs, and the field that does."""
+
+
+def _interface_needs(catalog: Catalog, events: bool, missing: dict[str, list[str]]) -> _Needs:
+    """Return what gives the interfaces that one needs, and adds those that there are not to `missing`."""
 
     def needs(name: TypeName) -> Iterator[tuple[TypeName, str]]:
         for needed, user in _needs(catalog.definition(name).interface, events):
@@ -39,17 +77,7 @@ def closure(
             else:
                 yield owner, user
 
-    queue = [name for package in whole for name in catalog.package(package)]
-    queue += [catalog.definition(name).name for name in single]
-    complete = set(whole)
-    while queue:
-        _order_by_need(queue, needs, order)
-        needed_packages = {name.package for name in order} - complete - partial
-        complete |= needed_packages
-        queue = [name for package in sorted(needed_packages) for name in catalog.package(package)]
-    if missing:
-        raise _missing_error(catalog, missing)
-    return list(order)
+    return needs
 
 
 def _needs(interface: Interface, events: bool) -> Iterator[tuple[TypeName, str]]:
@@ -70,11 +98,7 @@ def _users(message: Message) -> Iterator[tuple[TypeName, str]]:
         yield name, f"{message.name}.{field.name}{place}"
 
 
-def _order_by_need(
-    names: Iterable[TypeName],
-    needs: Callable[[TypeName], Iterator[tuple[TypeName, str]]],
-    order: dict[TypeName, None],
-) -> None:
+def _order_by_need(names: Iterable[TypeName], needs: _Needs, order: dict[TypeName, None]) -> None:
     """Add `names` and everything they need to `order`, what is needed first.
 
     It does not recurse: definitions may be nested deeper than Python's stack.

@@ -12,48 +12,41 @@ from collections.abc import Callable
 from typing import TypedDict
 
 from rosidl_adapter_proto.interfaces.model import (
-    ArrayType,
-    BasicType,
     Field,
     FieldType,
     Interface,
     Message,
-    SequenceType,
     Service,
-    StringType,
+    Shape,
     TypeName,
-    ValueType,
+    TypeParts,
     messages,
     references,
-    value_type,
+    type_parts,
 )
-from rosidl_adapter_proto.interfaces.scalars import SCALARS
+from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, SCALARS, Scalar
 
-# type_description_interfaces/msg/FieldType: arrays, bounded and unbounded sequences add a multiple of 48.
-FIELD_TYPE_IDS = {
-    "nested": 1,
-    "int8": 2,
-    "uint8": 3,
-    "int16": 4,
-    "uint16": 5,
-    "int32": 6,
-    "uint32": 7,
-    "int64": 8,
-    "uint64": 9,
-    "float": 10,
-    "double": 11,
-    "long double": 12,
-    "char": 13,
-    "wchar": 14,
-    "boolean": 15,
-    "octet": 16,
-    "string": 17,
-    "wstring": 18,
-    "bounded string": 21,
-    "bounded wstring": 22,
+# type_description_interfaces/msg/FieldType: what a shape, with or without a capacity, adds to the number of an element.
+_OFFSETS = {
+    (Shape.SINGLE, False): 0,
+    (Shape.ARRAY, True): 48,
+    (Shape.SEQUENCE, True): 96,
+    (Shape.SEQUENCE, False): 144,
 }
-ARRAY_OFFSET, BOUNDED_SEQUENCE_OFFSET, UNBOUNDED_SEQUENCE_OFFSET = 48, 96, 144
-_ELEMENT_NAMES = {type_id: name for name, type_id in FIELD_TYPE_IDS.items()}
+
+# The number of each kind of element: a scalar type with or without a string bound, or a nested message (None).
+_ELEMENT_IDS: dict[tuple[Scalar | None, bool], int] = {
+    (None, False): NESTED_TYPE_ID,
+    **{(row, False): row.type_id for row in SCALARS.values()},
+    **{(row, True): row.bounded_type_id for row in SCALARS.values() if row.bounded_type_id is not None},
+}
+
+_DESCRIBED = {
+    element_id + offset: (shape, has_capacity, scalar, is_bounded)
+    for (shape, has_capacity), offset in _OFFSETS.items()
+    for (scalar, is_bounded), element_id in _ELEMENT_IDS.items()
+}
+"""What each number stands for."""
 
 
 class FieldTypeDescription(TypedDict):
@@ -129,55 +122,38 @@ def _struct_of_parts(name: TypeName, **parts: TypeName) -> Message:
 
 def field_type_description(field_type: FieldType) -> FieldTypeDescription:
     """Describe the type of a field."""
-    element = value_type(field_type)
-    string_capacity, nested = 0, ""
-    if isinstance(element, BasicType):
-        key = element.name
-    elif isinstance(element, StringType):
-        key = "wstring" if element.wide else "string"
-        if element.bound is not None:
-            key, string_capacity = f"bounded {key}", element.bound
-    else:
-        key, nested = "nested", str(element)
-    offset, capacity = 0, 0
-    if isinstance(field_type, ArrayType):
-        offset, capacity = ARRAY_OFFSET, field_type.size
-    elif isinstance(field_type, SequenceType):
-        bounded = field_type.bound is not None
-        offset = BOUNDED_SEQUENCE_OFFSET if bounded else UNBOUNDED_SEQUENCE_OFFSET
-        capacity = field_type.bound or 0
+    shape, element, capacity, string_bound = type_parts(field_type)
+    scalar, nested = (None, str(element)) if isinstance(element, TypeName) else (element, "")
     return {
-        "type_id": FIELD_TYPE_IDS[key] + offset,
-        "capacity": capacity,
-        "string_capacity": string_capacity,
+        "type_id": _ELEMENT_IDS[scalar, string_bound is not None] + _OFFSETS[shape, capacity is not None],
+        "capacity": capacity or 0,
+        "string_capacity": string_bound or 0,
         "nested_type_name": nested,
     }
 
 
-def described_field_type(description: FieldTypeDescription) -> FieldType:
-    """Return the type that `field_type_description` describes.
+def described_type(description: FieldTypeDescription) -> TypeParts:
+    """Return what the description of a field's type stands for: the inverse of `field_type_description`.
 
     Raises:
-        ValueError: The type id is none of REP-2011, or the name of a nested type is none.
+        ValueError: Its type id is unknown, or it does not have the length, bound or name that goes with the type id.
     """
     type_id = description["type_id"]
-    shape, element_id = divmod(type_id - 1, ARRAY_OFFSET)
-    offset, key = shape * ARRAY_OFFSET, _ELEMENT_NAMES.get(element_id + 1)
-    if key is None or not 0 <= offset <= UNBOUNDED_SEQUENCE_OFFSET:
+    if type_id not in _DESCRIBED:
         raise ValueError(f"type id {type_id} is unknown (REP-2011); correct the type description")
-    element: ValueType
-    if key == "nested":
-        element = TypeName.parse(description["nested_type_name"])
-    elif key in SCALARS and not SCALARS[key].is_string:
-        element = BasicType(key)
-    else:
-        bound = description["string_capacity"] if key.startswith("bounded") else None
-        element = StringType(wide=key.endswith("wstring"), bound=bound)
-    if offset == ARRAY_OFFSET:
-        return ArrayType(element, description["capacity"])
-    if offset == BOUNDED_SEQUENCE_OFFSET:
-        return SequenceType(element, description["capacity"])
-    return SequenceType(element) if offset == UNBOUNDED_SEQUENCE_OFFSET else element
+    shape, has_capacity, scalar, is_bounded = _DESCRIBED[type_id]
+    capacity, string_bound = description["capacity"], description["string_capacity"]
+    if (has_capacity and capacity < 1) or (is_bounded and string_bound < 1):
+        raise ValueError(
+            f"type id {type_id} needs a {'capacity' if has_capacity and capacity < 1 else 'string capacity'} "
+            "above 0 (REP-2011); correct the type description"
+        )
+    return TypeParts(
+        shape,
+        scalar or TypeName.parse(description["nested_type_name"]),
+        capacity if has_capacity else None,
+        string_bound if is_bounded else None,
+    )
 
 
 def individual_description(message: Message) -> IndividualTypeDescription:

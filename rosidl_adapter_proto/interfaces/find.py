@@ -172,6 +172,24 @@ def interface_source(package: str, interfaces: Iterable[str]) -> Source:
     return Source(f"package {package}", {package: definitions})
 
 
+def text_source(texts: Mapping[TypeName, str]) -> Source:
+    """Return the source of definitions that are given as text, in the form of `.msg`, `.srv` and `.action` files.
+
+    Raises:
+        DefinitionError: The namespace of a type is none that definitions have.
+    """
+    packages: dict[str, dict[TypeName, Definition]] = {}
+    for name, text in texts.items():
+        if name.namespace not in NAMESPACES:
+            raise DefinitionError(f"{name}: what stands in the middle has to be msg, srv or action")
+        definition = Definition(name, f".{name.namespace}", str(name), _GIVEN_TEXTS, stored_text=text)
+        packages.setdefault(name.package, {})[name] = definition
+    return Source(_GIVEN_TEXTS, packages)
+
+
+_GIVEN_TEXTS = "the given texts"
+
+
 def prefixes() -> list[Path]:
     """Return where ROS packages are installed: `AMENT_PREFIX_PATH`, then the environment of this Python."""
     parts = [part for part in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if part]
@@ -194,6 +212,18 @@ def prefix_sources() -> list[Source]:
         if packages:
             sources.append(Source(origin, packages))
     return sources
+
+
+def installed_sources(distribution: str | None = None) -> list[Source]:
+    """Return everything there is without naming a folder: the ROS installations, then the embedded store.
+
+    Args:
+        distribution: That of the embedded store, as `store_source` takes it.
+
+    Raises:
+        DefinitionError: The store does not have the distribution that was asked for.
+    """
+    return [*prefix_sources(), store_source(distribution)]
 
 
 def store_source(distribution: str | None = None) -> Source:

@@ -12,7 +12,7 @@ import operator
 import re
 import reprlib
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -23,7 +23,6 @@ from typing import Any, NamedTuple
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,
-    FLOATING_POINT_TYPES,
     NAMESPACES,
     Action,
     Annotation,
@@ -42,10 +41,10 @@ from rosidl_adapter_proto.interfaces.model import (
     TypeName,
     Value,
     ValueType,
-    integer_range,
     value_type,
 )
 from rosidl_adapter_proto.interfaces.problem import problem
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
 
 MAX_CHARACTERS = 10_000_000
 """The longest file that is read."""
@@ -59,15 +58,13 @@ _LONGEST_QUOTE = 40
 _Node = Any
 _Path = tuple[str, ...]
 
-# Rules 27 to 33; every other basic type has its own name.
-_BASIC_TYPE_NAMES = {
-    "short": "int16",
-    "long": "int32",
-    "long long": "int64",
-    "unsigned short": "uint16",
-    "unsigned long": "uint32",
-    "unsigned long long": "uint64",
+_BASIC_TYPES = {
+    spelling: BasicType(row.name)
+    for row in SCALARS.values()
+    if not row.is_string
+    for spelling in (row.name, *row.idl)
 }
+"""The basic types in each of their spellings (rules 23 to 37 and 206 to 215)."""
 
 _PATH_LENGTH = len(dataclasses.fields(TypeName))
 
@@ -202,8 +199,10 @@ def parse_idl(text: str, name: TypeName, file: str) -> Interface:
 def _parser() -> Any:
     from lark import Lark
 
+    spellings = (" ".join(f'"{word}"' for word in spelling.split()) for spelling in _BASIC_TYPES)
     return Lark(
-        Path(__file__).with_name("idl.lark").read_text("utf-8"),
+        Path(__file__).with_name("idl.lark").read_text("utf-8")
+        + f"\n!base_type_spec: {' | '.join(spellings)}\n",
         parser="lalr",
         lexer="contextual",
         start="specification",
@@ -409,8 +408,7 @@ def _type(file: _File, scope: _Path, node: _Node) -> _Type:
 
 
 def _basic_type(file: _File, scope: _Path, node: _Node) -> _Type:
-    name = " ".join(node.children)
-    return _Type(BasicType(_BASIC_TYPE_NAMES.get(name, name)))
+    return _Type(_BASIC_TYPES[" ".join(node.children)])
 
 
 def _string_type(file: _File, scope: _Path, node: _Node) -> _Type:
@@ -613,9 +611,9 @@ def _positive(file: _File, scope: _Path, expression: _Node) -> int:
 
 def _complement_mask(type: ValueType) -> int | None:
     """Return all bits of an unsigned type, and None for any other (section 7.4.1.4.3.4)."""
-    if isinstance(type, BasicType) and type.name[0] in "uo":
-        return integer_range(type.name)[1]
-    return None
+    if isinstance(type, TypeName) or type.scalar.family not in (Family.INTEGER, Family.OCTET):
+        return None
+    return None if type.scalar.signed else type.scalar.range[1]
 
 
 # Literals
@@ -702,36 +700,57 @@ def _fitted(value: object, type: ValueType) -> ScalarValue:
     """
     if isinstance(type, TypeName):
         raise _Mistake(f"the message {type} cannot have a default value")
-    if isinstance(type, StringType):
-        return _fitted_string(value, type)
-    if type.name == "boolean":
-        if not isinstance(value, int) or value not in (0, 1):
-            raise _Mistake(f"{_shown(value)} is not TRUE or FALSE")
-        return bool(value)
-    if type.name in ("char", "wchar") and isinstance(value, str) and len(value) == 1:
-        value = ord(value)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise _Mistake(f"{_shown(value)} is not a number")
-    if type.name in FLOATING_POINT_TYPES:
-        return _fitted_float(value)
-    low, high = integer_range(type.name)
+    bound = type.bound if isinstance(type, StringType) else None
+    return _FITTERS[type.scalar.family](value, type.scalar, bound)
+
+
+def _fitted_boolean(value: object, scalar: Scalar, bound: int | None) -> bool:
+    if not isinstance(value, int) or value not in (0, 1):
+        raise _Mistake(f"{_shown(value)} is not TRUE or FALSE")
+    return bool(value)
+
+
+def _fitted_integer(value: object, scalar: Scalar, bound: int | None) -> int:
+    value, (low, high) = _number(value), scalar.range
     if not isinstance(value, int) or not low <= value <= high:
-        raise _Mistake(f"{_shown(value)} does not fit {type.name}: use a whole number from {low} to {high}")
+        raise _Mistake(f"{_shown(value)} does not fit {scalar.name}: use a whole number from {low} to {high}")
     return value
 
 
-def _fitted_float(value: float) -> float:
+def _fitted_character(value: object, scalar: Scalar, bound: int | None) -> int:
+    is_character = isinstance(value, str) and len(value) == 1
+    return _fitted_integer(ord(str(value)) if is_character else value, scalar, bound)
+
+
+def _fitted_float(value: object, scalar: Scalar, bound: int | None) -> float:
     try:
-        return float(value)
+        return float(_number(value))
     except OverflowError:
         raise _Mistake(f"{_shown(value)} is too large") from None
 
 
-def _fitted_string(value: object, type: StringType) -> str:
+def _fitted_string(value: object, scalar: Scalar, bound: int | None) -> str:
     if not isinstance(value, str):
         raise _Mistake(f"{_shown(value)} is not a string: put it in quotes")
-    if type.bound is not None and len(value) > type.bound:
-        raise _Mistake(f"{_shown(value)} is longer than {type.bound} characters")
+    if bound is not None and len(value) > bound:
+        raise _Mistake(f"{_shown(value)} is longer than {bound} characters")
+    return value
+
+
+_FITTERS: Mapping[Family, Callable[[object, Scalar, int | None], ScalarValue]] = {
+    Family.BOOLEAN: _fitted_boolean,
+    Family.INTEGER: _fitted_integer,
+    Family.FLOATING_POINT: _fitted_float,
+    Family.OCTET: _fitted_integer,
+    Family.CHARACTER: _fitted_character,
+    Family.STRING: _fitted_string,
+    Family.WSTRING: _fitted_string,
+}
+
+
+def _number(value: object) -> int | float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise _Mistake(f"{_shown(value)} is not a number")
     return value
 
 

@@ -9,28 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import NamedTuple
 
-INTEGER_BITS = {f"{sign}int{bits}": bits for sign in ("", "u") for bits in (8, 16, 32, 64)}
-"""The integer types and their width in bits."""
-
-FLOATING_POINT_TYPES = ("float", "double", "long double")
-
-BASIC_TYPES = (*INTEGER_BITS, *FLOATING_POINT_TYPES, "boolean", "octet", "char", "wchar")
-"""Names of the basic types, as OMG IDL 4.2 spells them (rules 24 to 36, 206 to 215)."""
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Scalar
 
 NAMESPACES = ("msg", "srv", "action")
 """The namespaces of interfaces in a package."""
 
 EMPTY_STRUCT_FIELD = "structure_needs_at_least_one_member"
 """The field, a `uint8`, that ROS gives to a struct that has none, since IDL structs cannot be empty."""
-
-
-def integer_range(name: str) -> tuple[int, int]:
-    """Return the smallest and the largest value of an integer type, or of `octet`, `char` or `wchar` as a number."""
-    bits = {"octet": 8, "char": 8, "wchar": 16, **INTEGER_BITS}[name]
-    if name.startswith("int"):
-        return -(1 << (bits - 1)), (1 << (bits - 1)) - 1
-    return 0, (1 << bits) - 1
 
 
 @dataclass(frozen=True, order=True)
@@ -63,9 +51,14 @@ class TypeName:
 
 @dataclass(frozen=True)
 class BasicType:
-    """A number, boolean, character or octet; `name` is one of `BASIC_TYPES`."""
+    """A number, boolean, character or octet; `name` is a key of `SCALARS` that is not a string."""
 
     name: str
+
+    @property
+    def scalar(self) -> Scalar:
+        """The row with every fact about it."""
+        return SCALARS[self.name]
 
 
 @dataclass(frozen=True)
@@ -74,6 +67,11 @@ class StringType:
 
     wide: bool = False
     bound: int | None = None
+
+    @property
+    def scalar(self) -> Scalar:
+        """The row with every fact about it."""
+        return SCALARS["wstring" if self.wide else "string"]
 
 
 ValueType = BasicType | StringType | TypeName
@@ -108,6 +106,42 @@ def value_type(field_type: FieldType) -> ValueType:
     if isinstance(field_type, (ArrayType, SequenceType)):
         return field_type.value_type
     return field_type
+
+
+class Shape(IntEnum):
+    """How many elements a field has."""
+
+    SINGLE = 0
+    ARRAY = 1
+    SEQUENCE = 2
+
+
+class TypeParts(NamedTuple):
+    """A field type taken apart.
+
+    Attributes:
+        shape: How many elements there are.
+        element: The scalar type of an element, or the message that it is.
+        capacity: The length of an array; the bound of a sequence, None if it has none; None for a single element.
+        string_bound: The greatest number of characters in a string, None if it has no bound.
+    """
+
+    shape: Shape
+    element: Scalar | TypeName
+    capacity: int | None = None
+    string_bound: int | None = None
+
+
+def type_parts(field_type: FieldType) -> TypeParts:
+    """Take a field type apart."""
+    value = value_type(field_type)
+    element = value if isinstance(value, TypeName) else value.scalar
+    bound = value.bound if isinstance(value, StringType) else None
+    if isinstance(field_type, ArrayType):
+        return TypeParts(Shape.ARRAY, element, field_type.size, bound)
+    if isinstance(field_type, SequenceType):
+        return TypeParts(Shape.SEQUENCE, element, field_type.bound, bound)
+    return TypeParts(Shape.SINGLE, element, None, bound)
 
 
 @dataclass(frozen=True)
@@ -271,6 +305,23 @@ def messages(interface: Interface, *, events: bool = False) -> tuple[Message, ..
         *messages(interface.get_result, events=events),
         interface.feedback_message,
     )
+
+
+def parts(interface: Interface) -> dict[TypeName, dict[str, TypeName]]:
+    """Return the parts of each service and action that an interface is or has, by what ROS calls them."""
+    if isinstance(interface, Message):
+        return {}
+    if isinstance(interface, Service):
+        return {interface.name: {"request": interface.request.name, "response": interface.response.name}}
+    own = {
+        "goal": interface.goal.name,
+        "result": interface.result.name,
+        "feedback": interface.feedback.name,
+        "send_goal": interface.send_goal.name,
+        "get_result": interface.get_result.name,
+        "feedback_message": interface.feedback_message.name,
+    }
+    return {interface.name: own, **parts(interface.send_goal), **parts(interface.get_result)}
 
 
 def references(message: Message) -> Iterator[tuple[Field, TypeName]]:

@@ -9,13 +9,12 @@ import ast
 import re
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,
-    INTEGER_BITS,
     Action,
     ArrayType,
     BasicType,
@@ -31,20 +30,13 @@ from rosidl_adapter_proto.interfaces.model import (
     TypeName,
     Value,
     ValueType,
-    integer_range,
     value_type,
 )
 from rosidl_adapter_proto.interfaces.problem import problem
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
 
-MSG_TO_IDL_TYPE = {
-    "bool": "boolean",
-    "byte": "octet",
-    "char": "uint8",
-    "float32": "float",
-    "float64": "double",
-    **{name: name for name in INTEGER_BITS},
-}
-"""The primitive types of `.msg` and their IDL names; `string` and `wstring` are the same in both."""
+_PRIMITIVE_TYPES = {name: row for row in SCALARS.values() for name in row.msg}
+"""The primitive types of `.msg` by their names there."""
 
 _NAME_RULES = {
     "package": re.compile(r"(?!.*__)(?!.*_$)[a-z][a-z0-9_]*"),
@@ -261,12 +253,14 @@ class _MessageReader:
         return SequenceType(element, size) if match["upper_bound"] else ArrayType(element, size)
 
     def _value_type(self, text: str, location: Location) -> ValueType:
-        if text in MSG_TO_IDL_TYPE:
-            return BasicType(MSG_TO_IDL_TYPE[text])
         base, is_bounded, bound_text = text.partition("<=")
-        if base in ("string", "wstring") and (is_bounded or text == base):
-            bound = self._positive(bound_text, f"the bound of {text!r}", location) if is_bounded else None
-            return StringType(base == "wstring", bound)
+        if base in _PRIMITIVE_TYPES:
+            primitive = _PRIMITIVE_TYPES[base]
+            if primitive.is_string:
+                bound = self._positive(bound_text, f"the bound of {text!r}", location) if is_bounded else None
+                return StringType(primitive.family is Family.WSTRING, bound)
+            if not is_bounded:
+                return BasicType(primitive.name)
         if text in ("time", "duration"):
             raise self._problem(f"{text!r} is a ROS 1 type; use builtin_interfaces/{text.title()}", location)
         if text in _NAMES_ELSEWHERE:
@@ -369,23 +363,22 @@ def _quoted(text: str) -> str:
     return repr(text) if len(text) <= _LONGEST_QUOTATION else f"{text[:_LONGEST_QUOTATION]!r}..."
 
 
-def _boolean_value(text: str, _: str) -> bool:
+def _boolean_value(text: str, scalar: Scalar, bound: int | None) -> bool:
     values = {"true": True, "1": True, "false": False, "0": False}
     if text.lower() not in values:
         raise ValueError(f"a bool must be true, false, 1 or 0, not {_quoted(text)}")
     return values[text.lower()]
 
 
-def _float_value(text: str, _: str) -> float:
+def _float_value(text: str, scalar: Scalar, bound: int | None) -> float:
     try:
         return float(text)
     except ValueError:
         raise ValueError(f"expected a number with '.' as its decimal point, not {_quoted(text)}") from None
 
 
-def _integer_value(text: str, name: str) -> int:
-    lowest, highest = integer_range(name)
-    shown = "byte" if name == "octet" else name
+def _integer_value(text: str, scalar: Scalar, bound: int | None) -> int:
+    lowest, highest = scalar.range
     try:
         value = int(text)
     except ValueError:
@@ -396,25 +389,13 @@ def _integer_value(text: str, name: str) -> int:
                 f"expected a whole number from {lowest} to {highest}, not {_quoted(text)}"
             ) from None
     if not lowest <= value <= highest:
-        raise ValueError(f"{_quoted(text)} does not fit {shown}, which goes from {lowest} to {highest}")
+        raise ValueError(
+            f"{_quoted(text)} does not fit {scalar.msg[0]}, which goes from {lowest} to {highest}"
+        )
     return value
 
 
-_READERS: dict[str, Callable[[str, str], ScalarValue]] = {
-    "boolean": _boolean_value,
-    "float": _float_value,
-    "double": _float_value,
-}
-
-
-def _value(scalar: BasicType | StringType, text: str) -> ScalarValue:
-    """Return the value that `text` stands for, strings with their escape sequences as they are."""
-    if isinstance(scalar, StringType):
-        return _string_value(text, scalar.bound)
-    return _READERS.get(scalar.name, _integer_value)(text, scalar.name)
-
-
-def _string_value(text: str, bound: int | None) -> str:
+def _string_value(text: str, scalar: Scalar, bound: int | None) -> str:
     for quote in "\"'":
         if text.startswith(quote) and text.endswith(quote):
             text = text[1:-1]
@@ -425,6 +406,23 @@ def _string_value(text: str, bound: int | None) -> str:
     if bound is not None and len(text) > bound:
         raise ValueError(f"the string has {len(text)} characters, more than its bound of {bound}")
     return text
+
+
+_VALUE_READERS: Mapping[Family, Callable[[str, Scalar, int | None], ScalarValue]] = {
+    Family.BOOLEAN: _boolean_value,
+    Family.INTEGER: _integer_value,
+    Family.FLOATING_POINT: _float_value,
+    Family.OCTET: _integer_value,
+    Family.CHARACTER: _integer_value,
+    Family.STRING: _string_value,
+    Family.WSTRING: _string_value,
+}
+
+
+def _value(element: BasicType | StringType, text: str) -> ScalarValue:
+    """Return the value that `text` stands for, strings with their escape sequences as they are."""
+    bound = element.bound if isinstance(element, StringType) else None
+    return _VALUE_READERS[element.scalar.family](text, element.scalar, bound)
 
 
 def _split_strings(text: str) -> list[str]:

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.errors import SchemaError
+from rosidl_adapter_proto.interfaces.description import field_type_description
 from rosidl_adapter_proto.interfaces.model import (
-    ArrayType,
-    BasicType,
     Constant,
     Field,
+    FieldType,
     Interface,
     Message,
-    SequenceType,
+    ScalarValue,
     Service,
-    StringType,
+    Shape,
     TypeName,
     Value,
-    integer_range,
     messages,
     references,
-    value_type,
+    type_parts,
 )
+from rosidl_adapter_proto.interfaces.scalars import Family, Scalar
 from rosidl_adapter_proto.schema.numbering import Numbering
 from rosidl_adapter_proto.schema.typemap import (
     PROTO_ACTION_GET_RESULT_CALL_NAME,
@@ -37,6 +37,10 @@ from rosidl_adapter_proto.schema.typemap import (
     proto_type,
 )
 
+ProtoScalarValue = bool | int | float | str | bytes
+ProtoValue = ProtoScalarValue | tuple[ProtoScalarValue, ...]
+"""A value as a protobuf class takes it; a tuple for a repeated field."""
+
 
 @dataclass(frozen=True)
 class ProtoField:
@@ -47,7 +51,15 @@ class ProtoField:
         repeated: Whether it is a repeated field.
         type: Its protobuf type; a message by full name with a leading dot.
         number: Its field number.
+        json_name: Its name in protobuf's JSON.
         comment: The lines to stand above it.
+        shape: How many elements it has in ROS.
+        element: The scalar type of an element in ROS, or the message that it is.
+        capacity: The length of an array; the bound of a sequence, None if it has none; None for a single element.
+        string_bound: The greatest number of characters in a string, None if it has no bound.
+        limits: The smallest and largest number that ROS has, where the protobuf type of one element has others.
+        default: Its default value in ROS, if it has one, as the protobuf class takes it.
+        type_id: The number of its type in a type description (REP-2011).
         source: The ROS field it stands for.
     """
 
@@ -55,7 +67,15 @@ class ProtoField:
     repeated: bool
     type: str
     number: int
+    json_name: str
     comment: tuple[str, ...]
+    shape: Shape
+    element: Scalar | TypeName
+    capacity: int | None
+    string_bound: int | None
+    limits: tuple[int, int] | None
+    default: ProtoValue | None
+    type_id: int
     source: Field
 
 
@@ -65,8 +85,11 @@ class ProtoMessage:
 
     Attributes:
         name: Its name, the same as in ROS.
+        full_name: Its name with its protobuf package.
+        type_name: The ROS type it stands for.
         comment: The lines to stand above it.
         fields: Its fields, in order of declaration.
+        constants: The constants of the ROS message.
         reserved_numbers: Numbers of fields that it had once.
         reserved_names: Names of fields that it had once.
         has_json_conflict: Whether two of its fields share a JSON name, which proto3 only allows with an option.
@@ -74,8 +97,11 @@ class ProtoMessage:
     """
 
     name: str
+    full_name: str
+    type_name: TypeName
     comment: tuple[str, ...]
     fields: tuple[ProtoField, ...]
+    constants: tuple[Constant, ...]
     reserved_numbers: tuple[int, ...]
     reserved_names: tuple[str, ...]
     has_json_conflict: bool
@@ -182,26 +208,73 @@ def _proto_message(message: Message, numbering: Numbering) -> ProtoMessage:
                 "use letters, digits and underscores, beginning with a letter"
             )
     numbers = numbering.numbers(message)
-    json_names = [_json_name(each.name) for each in message.fields]
+    fields = tuple(_proto_field(each, numbers.fields[each.name]) for each in message.fields)
     return ProtoMessage(
         message.name.name,
+        proto_full_name(message.name),
+        message.name,
         _lines([*message.comment, *_constant_lines(message.constants)]),
-        tuple(
-            ProtoField(
-                each.name,
-                is_repeated(each.type),
-                proto_type(each.type),
-                numbers.fields[each.name],
-                _lines([*each.comment, *facts(each)]),
-                each,
-            )
-            for each in message.fields
-        ),
+        fields,
+        message.constants,
         tuple(sorted(numbers.reserved.values())),
         tuple(sorted(numbers.reserved)),
-        len(set(json_names)) < len(json_names),
+        len({each.json_name for each in fields}) < len(fields),
         message,
     )
+
+
+def _proto_field(field: Field, number: int) -> ProtoField:
+    shape, element, capacity, string_bound = type_parts(field.type)
+    return ProtoField(
+        field.name,
+        is_repeated(field.type),
+        proto_type(field.type),
+        number,
+        _json_name(field.name),
+        _lines([*field.comment, *facts(field)]),
+        shape,
+        element,
+        capacity,
+        string_bound,
+        None if isinstance(element, TypeName) else _limits(element),
+        None if field.default is None else _proto_value(field.type, field.default),
+        field_type_description(field.type)["type_id"],
+        field,
+    )
+
+
+def _limits(scalar: Scalar) -> tuple[int, int] | None:
+    if scalar.family is Family.CHARACTER:
+        return 0, scalar.largest_character
+    if scalar.bits and scalar.bits < _PROTOBUF_INTEGER_BITS:
+        return scalar.range
+    return None
+
+
+_PROTOBUF_INTEGER_BITS = 32
+"""The width of the narrowest integers in protobuf."""
+
+
+def _proto_value(field_type: FieldType, value: Value) -> ProtoValue:
+    """Return the default value of a field as its protobuf class takes it."""
+    element = type_parts(field_type).element
+    assert isinstance(element, Scalar)  # a message has no default value
+    if not isinstance(value, tuple):
+        return _proto_scalar(element, value)
+    if element.repeated:
+        return tuple(_proto_scalar(element, each) for each in value)
+    return _COMPACT_VALUES[element.many]([int(each) for each in value])
+
+
+def _proto_scalar(scalar: Scalar, value: ScalarValue) -> ProtoScalarValue:
+    return str(value).encode("utf-16-le") if scalar.family is Family.WSTRING else value
+
+
+_COMPACT_VALUES: Mapping[str, Callable[[list[int]], str | bytes]] = {
+    "bytes": lambda numbers: bytes(each & 0xFF for each in numbers),
+    "string": lambda numbers: "".join(map(chr, numbers)),
+}
+"""How an array becomes one protobuf value, for each type that it may have there."""
 
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -231,19 +304,20 @@ def _service(interface: Interface) -> ProtoService | None:
 
 def facts(field: Field) -> list[str]:
     """Say what the protobuf type of a field does not: its unit, range, bounds and default value in ROS."""
-    element = value_type(field.type)
+    shape, element, capacity, string_bound = type_parts(field.type)
     lines = []
     if field.unit:
         lines.append(f"Unit: {field.unit}")
-    if isinstance(element, BasicType) and element.name in _NARROW_TYPES:
-        lowest, highest = integer_range(element.name)
-        lines.append(f"Values from {lowest} to {highest}.")
-    if isinstance(element, StringType) and element.bound is not None:
-        lines.append(f"At most {_count(element.bound, 'character')}.")
-    if isinstance(field.type, ArrayType):
-        lines.append(f"Exactly {_count(field.type.size, 'element')}.")
-    if isinstance(field.type, SequenceType) and field.type.bound is not None:
-        lines.append(f"At most {_count(field.type.bound, 'element')}.")
+    if (
+        isinstance(element, Scalar)
+        and element.family is not Family.CHARACTER
+        and (limits := _limits(element))
+    ):
+        lines.append(f"Values from {limits[0]} to {limits[1]}.")
+    if string_bound is not None:
+        lines.append(f"At most {_count(string_bound, 'character')}.")
+    if capacity is not None:
+        lines.append(f"{'Exactly' if shape is Shape.ARRAY else 'At most'} {_count(capacity, 'element')}.")
     if field.default is not None:
         lines.append(f"Default in ROS: {_literal(field.default)}")
     return lines
@@ -251,9 +325,6 @@ def facts(field: Field) -> list[str]:
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'s' * (number != 1)}"
-
-
-_NARROW_TYPES = ("int8", "uint8", "int16", "uint16", "octet")
 
 
 def _constant_lines(constants: Iterable[Constant]) -> list[str]:

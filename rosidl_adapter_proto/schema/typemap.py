@@ -5,46 +5,14 @@ It is that of rosidl_typesupport_protobuf: types, names and therefore bytes on t
 
 from __future__ import annotations
 
-from rosidl_adapter_proto.interfaces.model import (
-    ArrayType,
-    BasicType,
-    FieldType,
-    SequenceType,
-    StringType,
-    TypeName,
-    ValueType,
-    value_type,
-)
+from rosidl_adapter_proto.interfaces.model import FieldType, Shape, TypeName, type_parts
+from rosidl_adapter_proto.interfaces.scalars import SCALARS
 
-MSG_TYPE_TO_PROTO = {
-    "boolean": "bool",
-    "octet": "uint32",
-    "char": "uint32",
-    "wchar": "uint32",
-    "float": "float",
-    "double": "double",
-    "long double": "double",
-    "uint8": "uint32",
-    "int8": "int32",
-    "uint16": "uint32",
-    "int16": "int32",
-    "uint32": "fixed32",
-    "int32": "sfixed32",
-    "uint64": "fixed64",
-    "int64": "sfixed64",
-    "string": "string",
-    "wstring": "bytes",
-}
+MSG_TYPE_TO_PROTO = {name: row.protobuf for name, row in SCALARS.items()}
 """The protobuf type of each IDL type; a `wstring` is its UTF-16 code units, little-endian, without a mark."""
 
-COMPACT_ARRAYS = {
-    "octet": "bytes",
-    "uint8": "bytes",
-    "int8": "bytes",
-    "char": "string",
-    "wchar": "string",
-}
-"""IDL types whose arrays and sequences are one protobuf value instead of a repeated field."""
+DEFAULT_PYTHON_ROOT = "rosidl_proto"
+"""The namespace package that generated packages are in, unless another is chosen."""
 
 PROTO_PACKAGE_POSTFIX = "pb"
 """The last part of each protobuf package name."""
@@ -76,22 +44,13 @@ def proto_path(name: TypeName) -> str:
 
 def is_repeated(field_type: FieldType) -> bool:
     """Tell whether a type is a repeated field in protobuf."""
-    return isinstance(field_type, (ArrayType, SequenceType)) and _compact(field_type.value_type) is None
+    parts = type_parts(field_type)
+    return parts.shape is not Shape.SINGLE and (isinstance(parts.element, TypeName) or parts.element.repeated)
 
 
 def proto_type(field_type: FieldType) -> str:
     """Return the protobuf type of a field, without `repeated`; messages by full name with a leading dot."""
-    element = value_type(field_type)
-    if isinstance(field_type, (ArrayType, SequenceType)):
-        compact = _compact(element)
-        if compact is not None:
-            return compact
-    if isinstance(element, TypeName):
-        return f".{proto_full_name(element)}"
-    if isinstance(element, StringType):
-        return MSG_TYPE_TO_PROTO["wstring" if element.wide else "string"]
-    return MSG_TYPE_TO_PROTO[element.name]
-
-
-def _compact(element: ValueType) -> str | None:
-    return COMPACT_ARRAYS.get(element.name) if isinstance(element, BasicType) else None
+    parts = type_parts(field_type)
+    if isinstance(parts.element, TypeName):
+        return f".{proto_full_name(parts.element)}"
+    return parts.element.protobuf if parts.shape is Shape.SINGLE else parts.element.many

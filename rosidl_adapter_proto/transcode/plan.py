@@ -10,7 +10,6 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from enum import IntEnum
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 
@@ -19,19 +18,10 @@ from rosidl_adapter_proto.interfaces.description import (
     FieldDescription,
     IndividualTypeDescription,
     TypeDescription,
-    described_field_type,
+    described_type,
 )
-from rosidl_adapter_proto.interfaces.model import (
-    EMPTY_STRUCT_FIELD,
-    ArrayType,
-    BasicType,
-    FieldType,
-    SequenceType,
-    StringType,
-    ValueType,
-    value_type,
-)
-from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, SCALARS, CdrForm
+from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, Shape, TypeName
+from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, CdrForm, Scalar
 
 VERSION = 2
 """The version of packed plans, which the core must have too."""
@@ -53,14 +43,6 @@ _PROTOBUF_TYPES = {
     )
 }
 _PROTOBUF_TYPE_NAMES = {number: name for name, number in _PROTOBUF_TYPES.items()}
-
-
-class Shape(IntEnum):
-    """How many elements a field has."""
-
-    SINGLE = 0
-    ARRAY = 1
-    SEQUENCE = 2
 
 
 @dataclass(frozen=True)
@@ -304,11 +286,10 @@ class _Builder:
                 f"{where}: {part.descriptor.full_name} does not have this field; generate it again"
             )
         try:
-            field_type = described_field_type(field["type"])
+            shape, element, capacity, string_bound = described_type(field["type"])
         except ValueError as error:
             raise SchemaError(f"{where}: {error}") from None
-        form = _form(where, value_type(field_type))
-        shape, count = _shape(field_type)
+        form = _form(where, element)
         _check_protobuf_type(where, form, shape, protobuf_field)
         message = 0
         if form.cdr is CdrForm.MESSAGE:
@@ -331,8 +312,8 @@ class _Builder:
             protobuf=protobuf_field.type if in_protobuf else NOT_IN_PROTOBUF,
             number=protobuf_field.number if in_protobuf else 0,
             shape=shape,
-            count=count,
-            string_bound=field["type"]["string_capacity"] or UNBOUNDED,
+            count=capacity or UNBOUNDED,
+            string_bound=string_bound or UNBOUNDED,
             message=message,
             omit_empty=self._omit_empty and form.cdr is CdrForm.MESSAGE and shape is Shape.SINGLE,
         )
@@ -364,29 +345,16 @@ class _Form:
     repeated: bool
 
 
-def _form(where: str, element: ValueType) -> _Form:
-    if isinstance(element, BasicType):
-        scalar = SCALARS[element.name]
-    elif isinstance(element, StringType):
-        scalar = SCALARS["wstring" if element.wide else "string"]
-    else:
+def _form(where: str, element: Scalar | TypeName) -> _Form:
+    if isinstance(element, TypeName):
         message = FieldDescriptor.TYPE_MESSAGE
         return _Form(NESTED_TYPE_ID, CdrForm.MESSAGE, message, message, repeated=True)
-    if scalar.cdr is None:
+    if element.cdr is None:
         raise SchemaError(
-            f"{where}: {scalar.name} has no one layout in CDR and cannot be transcoded; make the field a double"
+            f"{where}: {element.name} has no one layout in CDR and cannot be transcoded; make the field a double"
         )
-    single, many = _PROTOBUF_TYPES[scalar.protobuf], _PROTOBUF_TYPES[scalar.many]
-    return _Form(scalar.type_id, scalar.cdr, single, many, scalar.repeated)
-
-
-def _shape(field_type: FieldType) -> tuple[Shape, int]:
-    """Return the shape of a field, and its length or bound."""
-    if isinstance(field_type, ArrayType):
-        return Shape.ARRAY, field_type.size
-    if isinstance(field_type, SequenceType):
-        return Shape.SEQUENCE, field_type.bound or UNBOUNDED
-    return Shape.SINGLE, UNBOUNDED
+    single, many = _PROTOBUF_TYPES[element.protobuf], _PROTOBUF_TYPES[element.many]
+    return _Form(element.type_id, element.cdr, single, many, element.repeated)
 
 
 def _check_protobuf_type(where: str, form: _Form, shape: Shape, field: FieldDescriptor) -> None:

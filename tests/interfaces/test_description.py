@@ -7,7 +7,9 @@ import pytest
 
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.description import (
+    FieldTypeDescription,
     describe,
+    described_type,
     field_type_description,
     structs,
     type_hash,
@@ -24,7 +26,9 @@ from rosidl_adapter_proto.interfaces.model import (
     Service,
     StringType,
     TypeName,
+    type_parts,
 )
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Scalar
 from tests import oracle
 
 INSTALLED = oracle.installed_definitions(".json")
@@ -83,7 +87,44 @@ OTHER = TypeName("pkg", "msg", "Other")
     ],
 )
 def test_field_types(field_type: FieldType, expected: tuple[int, int, int, str]) -> None:
-    assert tuple(field_type_description(field_type).values()) == expected
+    description = field_type_description(field_type)
+    assert tuple(description.values()) == expected
+    assert described_type(description) == type_parts(field_type)
+
+
+@pytest.mark.parametrize("scalar", SCALARS.values(), ids=SCALARS)
+def test_type_ids_are_those_of_ros(scalar: Scalar) -> None:
+    messages = pytest.importorskip("type_description_interfaces.msg", reason="needs the ROS wheels")
+    constants = messages.FieldType
+    name = {"octet": "BYTE"}.get(scalar.name, scalar.name.upper().replace(" ", "_"))
+    assert scalar.type_id == getattr(constants, f"FIELD_TYPE_{name}")
+    assert scalar.bounded_type_id == getattr(constants, f"FIELD_TYPE_BOUNDED_{name}", None)
+
+
+@pytest.mark.parametrize(
+    ("type_id", "reason"),
+    [
+        (0, "type id 0 is unknown (REP-2011); correct the type description"),
+        (19, "type id 19 is unknown (REP-2011); correct the type description"),  # a string of fixed length
+        (48, "type id 48 is unknown (REP-2011); correct the type description"),
+        (193, "type id 193 is unknown (REP-2011); correct the type description"),
+        (-47, "type id -47 is unknown (REP-2011); correct the type description"),
+        (50, "type id 50 needs a capacity above 0 (REP-2011); correct the type description"),
+        (98, "type id 98 needs a capacity above 0 (REP-2011); correct the type description"),
+        (21, "type id 21 needs a string capacity above 0 (REP-2011); correct the type description"),
+        (1, "'' is not of the form package/namespace/Name"),
+    ],
+)
+def test_descriptions_that_stand_for_nothing(type_id: int, reason: str) -> None:
+    description: FieldTypeDescription = {
+        "type_id": type_id,
+        "capacity": 0,
+        "string_capacity": 0,
+        "nested_type_name": "",
+    }
+    with pytest.raises(ValueError) as caught:
+        described_type(description)
+    assert str(caught.value) == reason
 
 
 def test_structs() -> None:

@@ -5,7 +5,6 @@ import dataclasses
 import pytest
 
 from rosidl_adapter_proto.interfaces.model import (
-    BASIC_TYPES,
     Action,
     ArrayType,
     BasicType,
@@ -16,7 +15,6 @@ from rosidl_adapter_proto.interfaces.model import (
     Service,
     StringType,
     TypeName,
-    integer_range,
     messages,
     references,
     value_type,
@@ -63,8 +61,7 @@ def test_what_is_no_type_name(text: str) -> None:
     ],
 )
 def test_integer_ranges(name: str, expected: tuple[int, int]) -> None:
-    assert name in BASIC_TYPES
-    assert integer_range(name) == expected
+    assert BasicType(name).scalar.range == expected
 
 
 @pytest.mark.parametrize("each", [INT8, StringType(), FOO])

@@ -23,11 +23,13 @@ from rosidl_adapter_proto.interfaces.model import (
     Message,
     SequenceType,
     Service,
+    Shape,
     StringType,
     TypeName,
     Value,
 )
 from rosidl_adapter_proto.interfaces.msg import parse_action, parse_msg, parse_srv
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Scalar
 from rosidl_adapter_proto.schema.numbering import (
     HashNumbering,
     Numbering,
@@ -128,13 +130,86 @@ def test_a_message() -> None:
     assert (message.reserved_numbers, message.reserved_names, message.has_json_conflict) == ((), (), False)
     assert isinstance(file.source, Message)
     assert proto_file(file.source, HashNumbering(), lambda name: name) == file
-    header, data, more = file.source.fields
+    assert (message.full_name, message.type_name, message.constants) == ("pkg.msg.pb.Foo", FOO, ())
+    assert tuple(each.source for each in message.fields) == file.source.fields
     number = compute_proto_field_number
-    assert message.fields == (
-        ProtoField("header", False, ".std_msgs.msg.pb.Header", number("header"), ("Its header.",), header),
-        ProtoField("data", False, "bytes", number("data"), ("Unit: m", "Values from 0 to 255."), data),
-        ProtoField("more", True, ".pkg.msg.pb.Foo", number("more"), ("At most 3 elements.",), more),
-    )
+    assert [(each.name, each.repeated, each.type, each.number, each.comment) for each in message.fields] == [
+        ("header", False, ".std_msgs.msg.pb.Header", number("header"), ("Its header.",)),
+        ("data", False, "bytes", number("data"), ("Unit: m", "Values from 0 to 255.")),
+        ("more", True, ".pkg.msg.pb.Foo", number("more"), ("At most 3 elements.",)),
+    ]
+
+
+INT8, UINT8, CHAR, WCHAR = (SCALARS[each] for each in ("int8", "uint8", "char", "wchar"))
+BOUNDED = StringType(bound=5)
+
+
+@pytest.mark.parametrize(
+    ("field_type", "parts", "limits", "type_id"),
+    [
+        # shape, element, capacity, string bound
+        (BasicType("int8"), (Shape.SINGLE, INT8, None, None), (-128, 127), 2),
+        (ArrayType(BasicType("int8"), 3), (Shape.ARRAY, INT8, 3, None), (-128, 127), 50),
+        (SequenceType(BasicType("uint8")), (Shape.SEQUENCE, UINT8, None, None), (0, 255), 147),
+        (SequenceType(BasicType("uint8"), 3), (Shape.SEQUENCE, UINT8, 3, None), (0, 255), 99),
+        (BasicType("char"), (Shape.SINGLE, CHAR, None, None), (0, 127), 13),
+        (BasicType("wchar"), (Shape.SINGLE, WCHAR, None, None), (0, 65535), 14),
+        (BasicType("uint32"), (Shape.SINGLE, SCALARS["uint32"], None, None), None, 7),
+        (BasicType("int64"), (Shape.SINGLE, SCALARS["int64"], None, None), None, 8),
+        (BasicType("float"), (Shape.SINGLE, SCALARS["float"], None, None), None, 10),
+        (BasicType("boolean"), (Shape.SINGLE, SCALARS["boolean"], None, None), None, 15),
+        (BOUNDED, (Shape.SINGLE, SCALARS["string"], None, 5), None, 21),
+        (ArrayType(BOUNDED, 2), (Shape.ARRAY, SCALARS["string"], 2, 5), None, 69),
+        (StringType(True), (Shape.SINGLE, SCALARS["wstring"], None, None), None, 18),
+        (DO, (Shape.SINGLE, DO, None, None), None, 1),
+        (SequenceType(DO, 9), (Shape.SEQUENCE, DO, 9, None), None, 97),
+    ],
+)
+def test_what_is_known_of_a_field(
+    field_type: FieldType,
+    parts: tuple[Shape, Scalar | TypeName, int | None, int | None],
+    limits: tuple[int, int] | None,
+    type_id: int,
+) -> None:
+    field = only_field(Field("some_name", field_type))
+    assert (field.shape, field.element, field.capacity, field.string_bound) == parts
+    assert (field.limits, field.type_id, field.json_name) == (limits, type_id, "someName")
+
+
+def only_field(field: Field) -> ProtoField:
+    (message,) = proto_file(Message(FOO, (field,)), HashNumbering(), lambda name: name).messages
+    (found,) = message.fields
+    return found
+
+
+@pytest.mark.parametrize(
+    ("field_type", "default", "expected"),
+    [
+        (BasicType("int32"), 5, 5),
+        (BasicType("octet"), 5, 5),
+        (BasicType("char"), 97, 97),
+        (BasicType("double"), 0.5, 0.5),
+        (BasicType("boolean"), False, False),
+        (StringType(), "ä", "ä"),
+        (StringType(wide=True), "ä\N{GRINNING FACE}", b"\xe4\0\x3d\xd8\x00\xde"),
+        (SequenceType(BasicType("int32")), (1, 2), (1, 2)),
+        (SequenceType(BasicType("int32")), (), ()),
+        (ArrayType(BasicType("boolean"), 2), (True, False), (True, False)),
+        (SequenceType(StringType()), ("a", "b"), ("a", "b")),
+        (SequenceType(StringType(wide=True)), ("a", ""), (b"a\0", b"")),
+        (ArrayType(BasicType("int8"), 2), (-1, 1), b"\xff\1"),
+        (SequenceType(BasicType("uint8")), (255, 1), b"\xff\1"),
+        (SequenceType(BasicType("octet")), (), b""),
+        (ArrayType(BasicType("char"), 2), (97, 98), "ab"),
+        (SequenceType(BasicType("wchar")), (228,), "ä"),
+        (BasicType("int32"), None, None),
+    ],
+)
+def test_default_values_are_those_of_protobuf(
+    field_type: FieldType, default: Value | None, expected: object
+) -> None:
+    found = only_field(Field("a", field_type, default)).default
+    assert (type(found), found) == (type(expected), expected)
 
 
 def test_an_empty_message() -> None:

@@ -1,0 +1,377 @@
+"""Types at run time: ROS types and their protobuf classes, made from definitions without generated code.
+
+Names, field numbers and descriptors are those that generated code has. Where the process holds generated code of the
+same version of a type, its protobuf class is the same one.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import RLock
+from typing import Any, NamedTuple
+
+from google.protobuf import descriptor_pool, reflection
+from google.protobuf.descriptor import Descriptor, FileDescriptor
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message import Message as ProtobufMessage
+
+from rosidl_adapter_proto.errors import DefinitionError, SchemaError
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.closure import type_closure
+from rosidl_adapter_proto.interfaces.description import TypeDescription, type_hash
+from rosidl_adapter_proto.interfaces.find import Source, folder_source, installed_sources, text_source
+from rosidl_adapter_proto.interfaces.model import ScalarValue, TypeName, parts
+from rosidl_adapter_proto.schema.descriptor import file_descriptor
+from rosidl_adapter_proto.schema.numbering import HashNumbering, Numbering, SequentialNumbering
+from rosidl_adapter_proto.schema.proto import ProtoFile, ProtoMessage, check_names, proto_file
+from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
+
+MessageClass = type[ProtobufMessage]
+
+
+@dataclass(frozen=True, eq=False)
+class Schema:
+    """One type, as ROS and protobuf have it.
+
+    A message has a protobuf class. A service and an action have parts instead, each with a schema of its own:
+    `request` and `response`, or `goal`, `result`, `feedback`, `send_goal`, `get_result` and `feedback_message`.
+
+    Attributes:
+        type_name: Its ROS name, such as `sensor_msgs/msg/Imu`.
+        type_hash: Its RIHS01 hash (REP-2011).
+        type_description: Itself and everything that it refers to (REP-2011).
+        file: The `.proto` file that it is in.
+        message: The protobuf message, as plain data; None for a service or an action.
+        parts: The parts of a service or an action by their names; empty for a message.
+    """
+
+    type_name: str
+    type_hash: str
+    type_description: TypeDescription = field(repr=False)
+    file: ProtoFile = field(repr=False)
+    message: ProtoMessage | None = field(repr=False, default=None)
+    parts: Mapping[str, Schema] = field(repr=False, default_factory=dict)
+    _message_class: MessageClass | None = field(repr=False, default=None)
+
+    @property
+    def message_class(self) -> MessageClass:
+        """The protobuf class of a message.
+
+        Raises:
+            SchemaError: It is a service or an action.
+        """
+        if self._message_class is None:
+            raise SchemaError(
+                f"{self.type_name} is no message and has no protobuf class; take that of a part: "
+                f"{', '.join(self.parts)}"
+            )
+        return self._message_class
+
+    @property
+    def descriptor(self) -> Descriptor:
+        """The protobuf descriptor of a message; errors are those of `message_class`."""
+        return self.message_class.DESCRIPTOR  # type: ignore[return-value, unused-ignore]  # upb's is like it
+
+    @property
+    def constants(self) -> Mapping[str, ScalarValue]:
+        """The constants of a message by their names; a service and an action have none."""
+        return {each.name: each.value for each in self.message.constants} if self.message else {}
+
+    @property
+    def request(self) -> Schema:
+        """The request of a service."""
+        return self._part("request")
+
+    @property
+    def response(self) -> Schema:
+        """The response of a service."""
+        return self._part("response")
+
+    @property
+    def goal(self) -> Schema:
+        """The goal of an action."""
+        return self._part("goal")
+
+    @property
+    def result(self) -> Schema:
+        """The result of an action."""
+        return self._part("result")
+
+    @property
+    def feedback(self) -> Schema:
+        """The feedback of an action."""
+        return self._part("feedback")
+
+    @property
+    def send_goal(self) -> Schema:
+        """The service of an action that sends a goal."""
+        return self._part("send_goal")
+
+    @property
+    def get_result(self) -> Schema:
+        """The service of an action that waits for the result of a goal."""
+        return self._part("get_result")
+
+    @property
+    def feedback_message(self) -> Schema:
+        """The message of the feedback topic of an action."""
+        return self._part("feedback_message")
+
+    def _part(self, name: str) -> Schema:
+        if name not in self.parts:
+            known = f"its parts are {', '.join(self.parts)}" if self.parts else "it is a message"
+            raise SchemaError(f"{self.type_name} has no {name}: {known}")
+        return self.parts[name]
+
+
+class TypeRegistry:
+    """Gives the schema of any type by its ROS name, such as `registry["sensor_msgs/msg/Imu"]`.
+
+    A schema is made when it is first asked for, together with what it refers to, and is the same object from then on.
+    Parts of services and actions have names too, such as `std_srvs/srv/SetBool_Request`. A registry can be used from
+    many threads.
+
+    A protobuf class is that of generated code, which is imported where it is found, or of the same descriptor pool.
+    Where that holds another version of a type or of one that it refers to, the class is one of another pool.
+
+    Args:
+        catalog: Where definitions come from: by default what is installed (`AMENT_PREFIX_PATH` and the environment of
+            this Python), and the embedded store.
+        lock_file: Where sequential field numbers are kept; without it, numbers are hashes of the names.
+        events: Whether services have their `_Event` messages, as in code generated with `--events`.
+
+    Raises:
+        DefinitionError: Definitions cannot be found.
+        SchemaError: The lock file cannot be read or is damaged.
+    """
+
+    def __init__(
+        self, catalog: Catalog | None = None, *, lock_file: Path | None = None, events: bool = False
+    ) -> None:
+        self._catalog = Catalog(tuple(installed_sources())) if catalog is None else catalog
+        self._numbering = _numbering(lock_file)
+        self._events = events
+        self._files: dict[TypeName, _File] = {}
+        self._schemas: dict[TypeName, Schema] = {}
+
+    @classmethod
+    def from_folders(
+        cls, *folders: Path | str, lock_file: Path | None = None, events: bool = False
+    ) -> TypeRegistry:
+        """Return a registry of the packages in some folders; what they do not have is what is installed.
+
+        Args:
+            folders: Package folders, or folders that have package folders at any depth; the first that has a package
+                wins.
+            lock_file: As for a registry.
+            events: As for a registry.
+
+        Raises:
+            DefinitionError: A folder has no definitions.
+            SchemaError: The lock file cannot be read or is damaged.
+        """
+        sources = (*(folder_source(Path(each)) for each in folders), *installed_sources())
+        return cls(Catalog(sources), lock_file=lock_file, events=events)
+
+    @classmethod
+    def from_texts(
+        cls, texts: Mapping[str, str], *, lock_file: Path | None = None, events: bool = False
+    ) -> TypeRegistry:
+        """Return a registry of types that are given as text; what the texts do not have is what is installed.
+
+        Args:
+            texts: Definitions in the form of `.msg`, `.srv` and `.action` files, by the names of their types.
+            lock_file: As for a registry.
+            events: As for a registry.
+
+        Raises:
+            DefinitionError: A name is not of the form `package/namespace/Name`.
+            SchemaError: The lock file cannot be read or is damaged.
+        """
+        installed = Catalog(tuple(installed_sources()))
+        given = text_source({_parsed(name): text for name, text in texts.items()})
+        # Of a package, the texts may have some types only.
+        packages = {
+            name: {**package, **installed.packages.get(name, {}), **package}
+            for name, package in given.packages.items()
+        }
+        sources = (Source(given.origin, packages), *installed.sources)
+        return cls(Catalog(sources), lock_file=lock_file, events=events)
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether there is a definition of a type; it may still turn out not to be valid."""
+        try:
+            type_name = name if isinstance(name, TypeName) else _parsed(str(name))
+            return self._catalog.owner(type_name) is not None
+        except DefinitionError:
+            return False
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the name of every interface; parts of services and actions are not among them."""
+        return (str(name) for package in self._catalog.packages.values() for name in package)
+
+    def __getitem__(self, name: str | TypeName) -> Schema:
+        """Return the schema of a type.
+
+        Raises:
+            DefinitionError: There is no such type (the message names similar ones), something that it refers to is
+                missing, or a definition is not valid.
+            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it.
+        """
+        type_name = name if isinstance(name, TypeName) else _parsed(name)
+        with _lock:
+            if type_name not in self._schemas:
+                self._schemas[type_name] = self._schema(type_name)
+            return self._schemas[type_name]
+
+    def _schema(self, name: TypeName) -> Schema:
+        owner = self._catalog.definition_name(name)
+        descriptor = self._descriptor(owner)
+        file = self._files[owner].proto
+        message = next((each for each in file.messages if each.type_name == name), None)
+        group = parts(file.source).get(name, {})
+        if message is None and not group:
+            raise DefinitionError(f"{name} is the event of a service: it needs a registry with events=True")
+        description = self._catalog.describe(name)
+        return Schema(
+            str(name),
+            type_hash(description),
+            description,
+            file,
+            message,
+            {part: self[part_name] for part, part_name in group.items()},
+            _message_class(descriptor.message_types_by_name[name.name], owner) if message else None,
+        )
+
+    def _descriptor(self, name: TypeName) -> FileDescriptor:
+        """Return the file of an interface in a pool that has everything it refers to in the same version."""
+        names = type_closure(self._catalog, name, events=self._events)
+        for each in names:
+            if each not in self._files:
+                self._files[each] = self._file(each)
+                _import_generated_code(each)
+        check_names(each.proto for each in self._files.values())
+        try:
+            return _loaded([self._files[each] for each in names])
+        except _RefusedError as error:
+            raise SchemaError(f"{name}: protobuf does not take what it becomes: {error}") from None
+
+    def _file(self, name: TypeName) -> _File:
+        interface = self._catalog.definition(name).interface
+        proto = proto_file(interface, self._numbering, self._catalog.definition_name, events=self._events)
+        return _File(name, proto, file_descriptor(proto).SerializeToString(deterministic=True))
+
+
+class _File(NamedTuple):
+    """The `.proto` file of an interface, and its descriptor."""
+
+    name: TypeName
+    proto: ProtoFile
+    serialized: bytes
+
+
+class _RefusedError(Exception):
+    """A descriptor pool has another version of a file or message, or does not take it at all."""
+
+
+_lock = RLock()
+"""Held by any registry that makes a type: descriptor pools are shared by all of them."""
+
+_other_pools: list[DescriptorPool] = []
+"""Pools for versions of types that the default pool cannot have since it has others."""
+
+_kept_classes: set[MessageClass] = set()
+"""Every class that was made: releases of protobuf before 4.22 crash where that of a nested message is gone."""
+
+
+def _loaded(files: list[_File]) -> FileDescriptor:
+    """Return the last of some files in the first pool that can have them all, and make the classes of all messages.
+
+    Raises:
+        _RefusedError: Not even a new pool takes them.
+    """
+    for pool in (descriptor_pool.Default(), *_other_pools):
+        try:
+            return _loaded_in(pool, files)
+        except _RefusedError:
+            continue
+    pool = DescriptorPool()
+    descriptor = _loaded_in(pool, files)
+    _other_pools.append(pool)
+    return descriptor
+
+
+def _loaded_in(pool: DescriptorPool, files: list[_File]) -> FileDescriptor:
+    found = [_find(pool, each.proto.path) for each in files]
+    for file, descriptor in zip(files, found, strict=True):
+        if descriptor is not None and descriptor.serialized_pb != file.serialized:
+            raise _RefusedError(f"there is another version of {file.proto.path}")
+    descriptors = [each or _added(pool, file) for file, each in zip(files, found, strict=True)]
+    for file, descriptor in zip(files, descriptors, strict=True):
+        messages = descriptor.message_types_by_name.values()
+        _kept_classes.update(_message_class(each, file.name) for each in messages)
+    return descriptors[-1]
+
+
+def _find(pool: DescriptorPool, path: str) -> FileDescriptor | None:
+    try:
+        return pool.FindFileByName(path)
+    except KeyError:
+        return None
+
+
+def _added(pool: DescriptorPool, file: _File) -> FileDescriptor:
+    try:
+        pool.AddSerializedFile(file.serialized)
+    except TypeError as error:
+        raise _RefusedError(str(error)) from None
+    return pool.FindFileByName(file.proto.path)
+
+
+def _generated_module(name: TypeName) -> str:
+    """Return the module that generated code has the protobuf classes of an interface in."""
+    return f"{DEFAULT_PYTHON_ROOT}.{name.package}.{name.namespace}.{name.name}_pb2"
+
+
+def _import_generated_code(name: TypeName) -> None:
+    """Import generated code of an interface, if there is any.
+
+    The default pool holds one version of a file: if another came first, generated code could not be imported any more.
+    """
+    module = _generated_module(name)
+    try:
+        importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        if not f"{module}.".startswith(f"{error.name}."):  # what is missing is something that it needs
+            raise
+
+
+def _message_class(descriptor: Descriptor, owner: TypeName) -> MessageClass:
+    """Return the class of a message, which is the one that there is if generated code has made it already.
+
+    Else it gets the module that generated code would give it: if that comes later, it takes this class.
+    """
+    contents = {"DESCRIPTOR": descriptor, "__module__": _generated_module(owner)}
+    metaclass: Any = reflection.GeneratedProtocolMessageType
+    message_class: MessageClass = metaclass(descriptor.name, (ProtobufMessage,), contents)
+    return message_class
+
+
+def _numbering(lock_file: Path | None) -> Numbering:
+    if lock_file is None:
+        return HashNumbering()
+    try:
+        text = lock_file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SchemaError(f"cannot read {lock_file}: {error}") from None
+    return SequentialNumbering.from_lock(str(lock_file), text)
+
+
+def _parsed(name: str) -> TypeName:
+    try:
+        return TypeName.parse(name)
+    except ValueError as error:
+        raise DefinitionError(str(error)) from None

@@ -1,0 +1,154 @@
+"""Every scalar type in every form a field can have, from its definition to where it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto
+
+from rosidl_adapter_proto import TypeRegistry
+from rosidl_adapter_proto.interfaces.description import described_type, field_type_description
+from rosidl_adapter_proto.interfaces.idl import parse_idl
+from rosidl_adapter_proto.interfaces.model import (
+    ArrayType,
+    BasicType,
+    Field,
+    FieldType,
+    Message,
+    ScalarValue,
+    SequenceType,
+    Shape,
+    StringType,
+    TypeName,
+    type_parts,
+)
+from rosidl_adapter_proto.interfaces.msg import parse_msg
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
+from rosidl_adapter_proto.schema.descriptor import file_descriptor
+from rosidl_adapter_proto.schema.numbering import HashNumbering
+from rosidl_adapter_proto.schema.proto import ProtoField, proto_file
+from tests.folders import write_package
+
+NAME = TypeName("pkg", "msg", "Foo")
+
+EXTREMES: Mapping[Family, Callable[[Scalar], tuple[ScalarValue, ScalarValue]]] = {
+    Family.BOOLEAN: lambda row: (False, True),
+    Family.INTEGER: lambda row: row.range,
+    Family.FLOATING_POINT: lambda row: (-1.5, 2.0**127),
+    Family.OCTET: lambda row: row.range,
+    Family.CHARACTER: lambda row: (0, row.largest_character),
+    Family.STRING: lambda row: ("", "a\N{GRINNING FACE}"),
+    Family.WSTRING: lambda row: ("", "a\N{GRINNING FACE}"),
+}
+"""Two values of each type, the smallest and the largest where there are such."""
+
+
+def elements(row: Scalar) -> Iterator[tuple[BasicType | StringType, str]]:
+    """Yield the type of a row in the model, and what its name is followed by; strings also with a bound."""
+    if row.is_string:
+        yield StringType(row.family is Family.WSTRING), ""
+        yield StringType(row.family is Family.WSTRING, 4), "<=4"
+    else:
+        yield BasicType(row.name), ""
+
+
+def msg_spellings(row: Scalar) -> Iterator[tuple[FieldType, str]]:
+    for element, bound in elements(row):
+        for name in (f"{each}{bound}" for each in row.msg):
+            yield element, f"{name} a"
+            yield ArrayType(element, 3), f"{name}[3] a"
+            yield SequenceType(element), f"{name}[] a"
+            yield SequenceType(element, 3), f"{name}[<=3] a"
+
+
+def idl_spellings(row: Scalar) -> Iterator[tuple[FieldType, str]]:
+    for element, bound in elements(row):
+        for name in (f"{each}{bound and '<4>'}" for each in (row.name, *row.idl)):
+            yield element, f"{name} a;"
+            yield ArrayType(element, 3), f"{name} a[3];"
+            yield SequenceType(element), f"sequence<{name}> a;"
+            yield SequenceType(element, 3), f"sequence<{name}, 3> a;"
+
+
+FORMS = [
+    pytest.param(row, field_type, id=line.removesuffix(" a;"))
+    for row in SCALARS.values()
+    for field_type, line in dict(idl_spellings(replace(row, idl=()))).items()
+]
+forms = pytest.mark.parametrize(("row", "field_type"), FORMS)
+
+
+def proto_field(field: Field) -> ProtoField:
+    (message,) = proto_file(Message(NAME, (field,)), HashNumbering(), lambda name: name).messages
+    (found,) = message.fields
+    return found
+
+
+def test_there_are_values_of_every_family() -> None:
+    assert EXTREMES.keys() == set(Family)
+
+
+@pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
+def test_definitions(row: Scalar) -> None:
+    for field_type, line in msg_spellings(row):
+        assert parse_msg(line, NAME, "Foo.msg").fields == (Field("a", field_type),)
+    for field_type, line in idl_spellings(row):
+        message = parse_idl(f"module pkg {{ module msg {{ struct Foo {{ {line} }}; }}; }};", NAME, "Foo.idl")
+        assert message == Message(NAME, (Field("a", field_type),))
+
+
+@forms
+def test_descriptions(row: Scalar, field_type: FieldType) -> None:
+    parts = type_parts(field_type)
+    assert parts.element is row
+    assert described_type(field_type_description(field_type)) == parts
+
+
+@forms
+def test_protobuf_fields_and_descriptors(row: Scalar, field_type: FieldType) -> None:
+    field = proto_field(Field("a", field_type))
+    is_single = field.shape is Shape.SINGLE
+    assert field.element is row
+    assert (field.type, field.repeated) == (
+        (row.protobuf, False) if is_single else (row.many, row.many == row.protobuf)
+    )
+    message = Message(NAME, (Field("a", field_type),))
+    (described,) = (
+        file_descriptor(proto_file(message, HashNumbering(), lambda name: name)).message_type[0].field
+    )
+    assert described.type == getattr(FieldDescriptorProto, f"TYPE_{field.type.upper()}")
+    assert (described.label == FieldDescriptorProto.LABEL_REPEATED) == field.repeated
+
+
+@pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
+def test_values_in_protobuf(row: Scalar, tmp_path: Path) -> None:
+    """A protobuf class takes default values as protobuf fields have them, the smallest and the largest ones."""
+    package = f"scalars_{row.name.replace(' ', '_')}"
+    field_types = list(dict(idl_spellings(row)))
+    members = " ".join(
+        line.replace(" a", f" a{number}") for number, line in enumerate(dict(idl_spellings(row)).values())
+    )
+    text = f"module {package} {{ module msg {{ struct Foo {{ {members} }}; }}; }};"
+    registry = TypeRegistry.from_folders(write_package(tmp_path / package, {"msg/Foo.idl": text}))
+    message_class = registry[f"{package}/msg/Foo"].message_class
+    for value in EXTREMES[row.family](row):
+        fields = [
+            Field(f"a{number}", each, value if type_parts(each).shape is Shape.SINGLE else (value,) * 3)
+            for number, each in enumerate(field_types)
+        ]
+        defaults = {each.name: proto_field(each).default for each in fields}
+        message = message_class.FromString(message_class(**defaults).SerializeToString())
+        for name, default in defaults.items():
+            found = getattr(message, name)
+            assert (tuple(found) if isinstance(default, tuple) else found) == default
+
+
+@pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
+def test_limits(row: Scalar) -> None:
+    """Numbers that protobuf has and ROS has not are outside the limits."""
+    limits = proto_field(Field("a", BasicType(row.name) if not row.is_string else StringType())).limits
+    narrow = {"octet", "char", "wchar", "int8", "uint8", "int16", "uint16"}
+    assert limits == (EXTREMES[row.family](row) if row.name in narrow else None)
