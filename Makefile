@@ -80,7 +80,7 @@ benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/messages.py
 
 golden: $(VENV)/ready
-	$(BIN)/python -m pytest tests/generate/test_golden.py --update-golden
+	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py --update-golden
 
 format: $(VENV)/ready
 	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks
