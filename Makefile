@@ -62,8 +62,8 @@ test-colcon: $(COLCON)/ready
 test-fuzz: $(VENV)/ready
 	$(BIN)/cmake -S . -B build/fuzz -DROSIDL_PROTO_FUZZ=ON -DROSIDL_PROTO_PYTHON=OFF
 	$(BIN)/cmake --build build/fuzz
-	$(BIN)/python core/fuzz/make_corpus.py build/fuzz/corpus
-	ROSIDL_PROTO_FUZZ_PLAN=build/fuzz/corpus/plan.bin \
+	rm -rf build/fuzz/corpus && $(BIN)/python core/fuzz/make_corpus.py build/fuzz/corpus
+	ROSIDL_PROTO_FUZZ_PLANS=build/fuzz/corpus/plans.bin \
 	  build/fuzz/core/fuzz/fuzz_driver $(FUZZ_MUTATIONS) build/fuzz/corpus/inputs/*
 
 # Coverage-guided, for as long as FUZZ_SECONDS says; needs clang.
@@ -72,7 +72,7 @@ fuzz: $(VENV)/ready
 	  -DCMAKE_CXX_COMPILER=clang++
 	$(BIN)/cmake --build build/fuzz-clang
 	$(BIN)/python core/fuzz/make_corpus.py build/fuzz-clang/corpus
-	ROSIDL_PROTO_FUZZ_PLAN=build/fuzz-clang/corpus/plan.bin \
+	ROSIDL_PROTO_FUZZ_PLANS=build/fuzz-clang/corpus/plans.bin \
 	  build/fuzz-clang/core/fuzz/fuzz_transcode -max_total_time=$(FUZZ_SECONDS) build/fuzz-clang/corpus/inputs
 
 benchmark: $(VENV)/ready
@@ -80,7 +80,7 @@ benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/messages.py
 
 golden: $(VENV)/ready
-	$(BIN)/python -m pytest tests/generate/test_golden.py --update-golden
+	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py --update-golden
 
 format: $(VENV)/ready
 	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks

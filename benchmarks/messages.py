@@ -134,10 +134,10 @@ def serialization_rows(
     """Yield the publish and subscribe paths of a type, without the middleware."""
     from rclpy.serialization import deserialize_message, serialize_message
 
-    ros_class, custom = type(message), adapter.convert_to_custom(message)
+    ros_class, custom, codec = type(message), adapter.convert_to_custom(message), adapter.codec
     data = serialize_message(message)
     ours, plain, native = seconds(
-        lambda: adapter.to_cdr(custom),
+        lambda: codec.to_cdr(custom),
         lambda: serialize_message(copy(custom, ros_class(), assign_to_ros)),
         lambda: serialize_message(message),
     )
@@ -146,7 +146,7 @@ def serialization_rows(
         f"{name}: publish", "serialize_message of the native message", native / ours, ">= 5" * (name == "Imu")
     )
     ours, plain, native = seconds(
-        lambda: adapter.from_cdr(data),
+        lambda: codec.from_cdr(data),
         lambda: copy(deserialize_message(data, ros_class), adapter.custom_type(), assign_to_protobuf),
         lambda: deserialize_message(data, ros_class),
     )

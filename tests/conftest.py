@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from tests.programs import run
+from tests.things import generate_things
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -33,6 +37,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "work").mkdir()
     monkeypatch.chdir(tmp_path / "work")
     return tmp_path / "work"
+
+
+@pytest.fixture(scope="session")
+def things(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
+    """The package `things`, generated and imported."""
+    folder = generate_things(tmp_path_factory.mktemp("things_root"))
+    sys.path.insert(0, str(folder / "python"))
+    modules = {
+        name: importlib.import_module(f"things_root.things.{name}") for name in ("msg", "srv", "action")
+    }
+    yield SimpleNamespace(folder=folder, **modules)
+    sys.path.remove(str(folder / "python"))
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ import numpy
 from hypothesis import strategies as st
 
 from rosidl_adapter_proto.adapter import TypeAdapter
-from rosidl_adapter_proto.generate.python import TYPECODES
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,
@@ -58,8 +57,8 @@ class RosMessages:
         else:
             longest = min(field_type.bound or _LONGEST_SEQUENCE, _LONGEST_SEQUENCE)
             values = st.lists(self.element(element), max_size=longest)
-        if isinstance(element, BasicType) and element.name in TYPECODES:
-            code = TYPECODES[element.name]
+        code = element.scalar.typecode if isinstance(element, BasicType) else None
+        if code is not None:
             if isinstance(field_type, ArrayType):
                 return values.map(lambda each: numpy.array(each, dtype=numpy.dtype(code)))
             return values.map(lambda each: array.array(code, each))

@@ -16,8 +16,8 @@ FLOORS = {
     "adapter": 4,
     "generate": 5,
     "ros": 5,
-    "cli": 7,
     "hooks": 7,
+    "cli": 8,
     "errors": 0,
 }
 ENTRANCES = ("__init__", "__main__")

@@ -1,8 +1,8 @@
-"""Write the inputs that fuzzing begins with: valid messages of a type that has every kind of field.
+"""Write what fuzzing begins with: plans of types that have every kind of field, and valid messages of them.
 
     python core/fuzz/make_corpus.py DIRECTORY
 
-makes `DIRECTORY/plan.bin` and one file for each input in `DIRECTORY/inputs`; `target.cpp` says what they mean.
+makes `DIRECTORY/plans.bin` and one file for each input in `DIRECTORY/inputs`; `target.cpp` says what they mean.
 """
 
 from __future__ import annotations
@@ -13,36 +13,52 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "transcode")]
+sys.path[:0] = [str(ROOT), str(ROOT / "core" / "samples")]
 
 from reference_cdr import write_cdr  # noqa: E402
 from ros_types import describe, nasty_types, protobuf_class, protobuf_message, random_value  # noqa: E402
 
 from rosidl_adapter_proto.transcode.plan import build_plan  # noqa: E402
 
-VALUES = 6
+VALUES = 3
+CHOSEN = (
+    ("test/msg/Nasty", ["f_double_one", "f_Inner_many.leaf.text", "f_wstring_array"]),
+    ("test/msg/Nasty", ["f_Inner_many"]),
+    ("test/msg/Inner", ["leaves.wide"]),
+    ("test/msg/Fixed", ["c"]),
+)
+"""Types and the fields that are read of them."""
+
+
+def sized(content: bytes) -> bytes:
+    return struct.pack("<I", len(content)) + content
 
 
 def main(directory: Path) -> None:
     types = nasty_types()
     inputs = directory / "inputs"
     inputs.mkdir(parents=True, exist_ok=True)
-    for name in types:
-        message_class = protobuf_class(types, name)
-        plan = build_plan(describe(types, name), message_class.DESCRIPTOR).pack()
-        short = name.rpartition("/")[2]
-        sized_plan = struct.pack("<I", len(plan)) + plan
-        rng = random.Random(name)
-        for i in range(VALUES):
-            value = random_value(types, name, rng)
-            cdr = write_cdr(types, name, value, big_endian=i % 2 == 1)
-            proto = protobuf_message(types, name, value, message_class()).SerializeToString()
-            contents = {"plan_cdr": b"\2" + sized_plan + cdr, "plan_proto": b"\3" + sized_plan + proto}
-            if short == "Nasty":
-                (directory / "plan.bin").write_bytes(plan)
-                contents = {"cdr": b"\0" + cdr, "proto": b"\1" + proto}
-            for kind, content in contents.items():
-                (inputs / f"{short}_{kind}_{i}").write_bytes(content)
+    plans: list[bytes] = []
+    for name, fields in [*((name, None) for name in types), *CHOSEN]:
+        for hashed in (True, False):
+            message_class = protobuf_class(types, name, hashed=hashed)
+            plan = build_plan(describe(types, name), message_class.DESCRIPTOR, fields=fields).pack()
+            number = len(plans)
+            plans.append(plan)
+            rng = random.Random(f"{name} {fields} {hashed}")
+            for i in range(VALUES):
+                value = random_value(types, name, rng)
+                cdr = write_cdr(types, name, value, big_endian=i % 2 == 1)
+                proto = protobuf_message(types, name, value, message_class()).SerializeToString()
+                contents = {
+                    "cdr": bytes((0, number)) + cdr,
+                    "proto": bytes((1, number)) + proto,
+                    "plan_cdr": b"\2" + sized(plan) + cdr,
+                    "plan_proto": b"\3" + sized(plan) + proto,
+                }
+                for kind, content in contents.items():
+                    (inputs / f"{number}_{kind}_{i}").write_bytes(content)
+    (directory / "plans.bin").write_bytes(b"".join(map(sized, plans)))
 
 
 if __name__ == "__main__":

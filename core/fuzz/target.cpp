@@ -1,19 +1,18 @@
 // The fuzz target: both directions, and plans themselves.
 //
 // The first byte of an input says what to do with the rest:
-//   0  a CDR message, 1  a protobuf message: of the type whose packed plan is in the file that the
-//   environment variable
-//      ROSIDL_PROTO_FUZZ_PLAN names
+//   0  the number of a plan, and then a CDR message; 1  the same with a protobuf message
 //   2  a packed plan, its size before it as uint32, and then a CDR message; 3  the same with a protobuf
 //   message
-// make_corpus.py writes the file with the plan and inputs to begin with.
+// The plans with numbers are in the file that the environment variable ROSIDL_PROTO_FUZZ_PLANS names, each
+// with its size before it. make_corpus.py writes that file and inputs to begin with.
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <vector>
 
-#include "../bytes.hpp"
-#include "../transcode.hpp"
+#include "rosidl_adapter_proto/transcode.hpp"
+#include "rosidl_adapter_proto/wire.hpp"
 
 using namespace rosidl_proto;
 
@@ -76,11 +75,21 @@ bool equal(const std::unique_ptr<Heap>& a, const std::unique_ptr<Heap>& b) {
          (a->size == 0 || std::memcmp(a->data.get(), b->data.get(), a->size) == 0);
 }
 
+// A plan that leaves fields out only reads CDR.
+void check_refused(const Plan& plan, Input proto) {
+  Error error;
+  Fields fields(plan);
+  uint64_t size = 0;
+  check(!measure_proto_to_cdr(plan, proto, kLimit, fields, &size, error) && error.reason == Reason::Partial,
+        "a partial plan writes CDR");
+}
+
 // What was written must be readable, and must give the same again. One thing is read from CDR and not from
 // protobuf: strings with NUL inside.
 void round_trip(const Plan& plan, bool is_cdr, Input input) {
   const auto proto = is_cdr ? to_proto(plan, input) : nullptr;
   if (is_cdr && !proto) return;
+  if (plan.partial()) return check_refused(plan, input);
   const auto cdr = to_cdr(plan, is_cdr ? input_of(proto) : input);
   if (!cdr) return;
   const auto again = to_proto(plan, input_of(cdr));
@@ -123,36 +132,41 @@ void change_proto(const Plan& plan, Input proto) {
   }
 }
 
-const Plan& plan_from_file() {
-  static const Plan plan = [] {
-    const char* name = std::getenv("ROSIDL_PROTO_FUZZ_PLAN");
-    std::FILE* file = name ? std::fopen(name, "rb") : nullptr;
-    check(file != nullptr, "ROSIDL_PROTO_FUZZ_PLAN does not name the file that make_corpus.py wrote");
-    std::vector<uint8_t> bytes(1 << 20);
-    bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file));
-    std::fclose(file);
-    Plan loaded;
-    check(loaded.load(bytes.data(), bytes.size()) == nullptr,
-          "the plan in ROSIDL_PROTO_FUZZ_PLAN cannot be loaded");
-    return loaded;
-  }();
-  return plan;
+std::vector<Plan> read_plans() {
+  const char* name = std::getenv("ROSIDL_PROTO_FUZZ_PLANS");
+  std::FILE* file = name ? std::fopen(name, "rb") : nullptr;
+  check(file != nullptr, "ROSIDL_PROTO_FUZZ_PLANS does not name the file that make_corpus.py wrote");
+  std::vector<Plan> plans;
+  uint8_t size_bytes[4];
+  while (std::fread(size_bytes, 1, sizeof size_bytes, file) == sizeof size_bytes) {
+    std::vector<uint8_t> bytes(load_little<uint32_t>(size_bytes));
+    const bool whole = std::fread(bytes.data(), 1, bytes.size(), file) == bytes.size();
+    check(whole && plans.emplace_back().load(bytes.data(), bytes.size()) == nullptr,
+          "a plan in ROSIDL_PROTO_FUZZ_PLANS cannot be loaded");
+  }
+  std::fclose(file);
+  check(!plans.empty(), "there are no plans in ROSIDL_PROTO_FUZZ_PLANS");
+  return plans;
+}
+
+void run(const Plan& plan, bool is_cdr, Input message) {
+  round_trip(plan, is_cdr, message);
+  is_cdr ? change(plan, message) : change_proto(plan, message);
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  if (size == 0) return 0;
+  static const std::vector<Plan> plans = read_plans();
+  if (size < 2) return 0;
   const uint8_t mode = data[0];
-  Input message{data + 1, size - 1};
   if (mode < 2) {
-    round_trip(plan_from_file(), mode == 0, message);
-    mode == 0 ? change(plan_from_file(), message) : change_proto(plan_from_file(), message);
-  } else if (mode < 4 && message.size >= 4) {
-    const uint32_t plan_size = load_little<uint32_t>(message.data);
+    run(plans[data[1] % plans.size()], mode == 0, {data + 2, size - 2});
+  } else if (mode < 4 && size >= 5) {
+    const uint32_t plan_size = load_little<uint32_t>(data + 1);
     Plan plan;
-    if (plan_size > message.size - 4 || plan.load(message.data + 4, plan_size) != nullptr) return 0;
-    round_trip(plan, mode == 2, {message.data + 4 + plan_size, message.size - 4 - plan_size});
+    if (plan_size > size - 5 || plan.load(data + 5, plan_size) != nullptr) return 0;
+    run(plan, mode == 2, {data + 5 + plan_size, size - 5 - plan_size});
   }
   return 0;
 }

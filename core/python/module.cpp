@@ -3,16 +3,14 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
-#include <algorithm>
-#include <atomic>
+#include <cstring>
 #include <deque>
-#include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include "../packed_fields.hpp"
-#include "../transcode.hpp"
+#include <rosidl_adapter_proto/packed_fields.hpp>
+
+#include "batch.hpp"
 
 namespace nb = nanobind;
 
@@ -22,79 +20,38 @@ namespace {
 // From this size on, the time that it takes to give the interpreter lock away and back does not count.
 constexpr uint64_t kLarge = 64 * 1024;
 
-// Messages that one thread takes at a time in a batch.
-constexpr size_t kBlock = 64;
-
 // The bytes of any contiguous Python buffer, kept alive and, if it can change its size, locked.
 class Buffer {
  public:
-  explicit Buffer(PyObject* object) {
-    if (PyBytes_Check(object)) {
-      Py_INCREF(object);
-      bytes_ = object;
-      input_ = {reinterpret_cast<const uint8_t*>(PyBytes_AS_STRING(object)),
-                static_cast<uint64_t>(PyBytes_GET_SIZE(object))};
-    } else {
-      if (PyObject_GetBuffer(object, &view_, PyBUF_SIMPLE) != 0) throw nb::python_error();
-      input_ = {static_cast<const uint8_t*>(view_.buf), static_cast<uint64_t>(view_.len)};
-    }
+  explicit Buffer(nb::handle object, int flags = PyBUF_SIMPLE) {
+    if (PyObject_GetBuffer(object.ptr(), &view_, flags) != 0) throw nb::python_error();
   }
   Buffer(const Buffer&) = delete;
-  Buffer(Buffer&& other) noexcept : bytes_(other.bytes_), view_(other.view_), input_(other.input_) {
-    other.bytes_ = nullptr;
-    other.view_.obj = nullptr;
-  }
   Buffer& operator=(const Buffer&) = delete;
-  ~Buffer() {
-    Py_XDECREF(bytes_);
-    if (view_.obj != nullptr) PyBuffer_Release(&view_);
-  }
+  ~Buffer() { PyBuffer_Release(&view_); }
 
-  Input input() const { return input_; }
+  const Py_buffer& view() const { return view_; }
+  Input input() const { return {static_cast<const uint8_t*>(view_.buf), static_cast<uint64_t>(view_.len)}; }
+  Output output() const { return {static_cast<uint8_t*>(view_.buf), static_cast<uint64_t>(view_.len)}; }
 
  private:
-  PyObject* bytes_ = nullptr;
   Py_buffer view_{};
-  Input input_{};
 };
 
-// The two directions behind one interface. What a direction keeps between measuring and writing can be shared
-// by many messages; a mark says where in it those of one message begin.
-struct CdrToProto {
-  struct Scratch {
-    explicit Scratch(const Plan&) {}
-    uint64_t mark() const { return lengths.size(); }
-    Lengths lengths;
-  };
-
-  static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
-                      Error& error) {
-    return measure_cdr_to_proto(plan, input, limit, scratch.lengths, size, error);
-  }
-  static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t mark, Output output,
-                    Error& error) {
-    return write_cdr_to_proto(plan, input, scratch.lengths, mark, output, error);
-  }
-};
-
-struct ProtoToCdr {
-  struct Scratch {
-    explicit Scratch(const Plan& plan) : fields(plan) {}
-    static uint64_t mark() { return 0; }
-    Fields fields;
-  };
-
-  static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
-                      Error& error) {
-    return measure_proto_to_cdr(plan, input, limit, scratch.fields, size, error);
-  }
-  static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t, Output output, Error& error) {
-    return write_proto_to_cdr(plan, input, scratch.fields, output, error);
-  }
-};
+// The content of a bytes object, which does not change as long as somebody holds it.
+Input input_of(nb::handle bytes) {
+  return {reinterpret_cast<const uint8_t*>(PyBytes_AS_STRING(bytes.ptr())),
+          static_cast<uint64_t>(PyBytes_GET_SIZE(bytes.ptr()))};
+}
 
 nb::object new_bytes(uint64_t size) {
   PyObject* const bytes = PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size));
+  if (bytes == nullptr) throw nb::python_error();
+  return nb::steal(bytes);
+}
+
+nb::object new_bytearray(uint64_t size) {
+  PyObject* const bytes = PyByteArray_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size));
   if (bytes == nullptr) throw nb::python_error();
   return nb::steal(bytes);
 }
@@ -103,49 +60,57 @@ Output output_of(nb::handle bytes, uint64_t size) {
   return {reinterpret_cast<uint8_t*>(PyBytes_AS_STRING(bytes.ptr())), size};
 }
 
-// Calls `work(i)` for each i below `count`, in order of i, on up to `threads` threads. `work` does not throw.
-template <class Work>
-void run_on_threads(size_t threads, size_t count, Work work) {
-  std::atomic<size_t> next{0};
-  const auto loop = [&] {
-    for (size_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::thread> others;
-  try {
-    for (size_t i = 1; i < std::min(threads, count); ++i) others.emplace_back(loop);
-  } catch (const std::exception&) {
-    // The system has no more threads: those that there are do all of it.
+// Calls `add(input)` for each message that `ranges` finds in `buffer`.
+template <class Add>
+void add_ranges(Input buffer, const Buffer& ranges, Add add) {
+  const Py_buffer& view = ranges.view();
+  const char* format = view.format == nullptr ? "B" : view.format;
+  if (*format == '@' || *format == '=' || *format == '<') ++format;
+  if (view.itemsize != 8 || std::strchr("QLNqln", *format) == nullptr)
+    throw nb::type_error("`ranges` must be a contiguous buffer of 64-bit numbers, such as array('Q')");
+  const auto* const places = static_cast<const uint8_t*>(view.buf);
+  if (view.len % sizeof(Range) != 0)
+    throw nb::value_error("`ranges` has an odd number of places; give each message its first byte and the one after its last");
+  for (Py_ssize_t at = 0; at < view.len; at += sizeof(Range)) {
+    Range range;
+    std::memcpy(&range, places + at, sizeof range);
+    if (range.first > range.last || range.last > buffer.size) {
+      const std::string number = std::to_string(static_cast<size_t>(at) / sizeof(Range));
+      const std::string text = "message " + number + " is from byte " + std::to_string(range.first) + " to " +
+                               std::to_string(range.last) + ", which is not in a buffer of " +
+                               std::to_string(buffer.size) + " bytes";
+      throw nb::value_error(text.c_str());
+    }
+    add(Input{buffer.data + range.first, range.last - range.first});
   }
-  loop();
-  for (std::thread& each : others) each.join();
 }
 
 class Transcoder {
  public:
-  Transcoder(nb::bytes plan, std::string type_name, uint64_t size_limit, nb::object message_class)
-      : type_name_(std::move(type_name)), size_limit_(size_limit), message_class_(std::move(message_class)) {
+  Transcoder(nb::bytes plan, std::string type_name, uint64_t size_limit)
+      : type_name_(std::move(type_name)), size_limit_(size_limit) {
     const char* wrong = plan_.load(static_cast<const uint8_t*>(plan.data()), plan.size());
     if (wrong != nullptr) throw nb::value_error(wrong);
-    if (message_class_.is_none()) return;
-    from_string_ = message_class_.attr("FromString");
-    // The method of the class: protobuf looks every name up among the fields of a message first.
-    serialize_ = message_class_.attr("SerializeToString");
   }
 
   const std::string& type_name() const { return type_name_; }
 
   template <class Direction>
   nb::object transcode(nb::handle data) const {
-    const Buffer buffer(data.ptr());
-    const Input input = buffer.input();
+    if (PyBytes_Check(data.ptr())) return transcode<Direction>(input_of(data));
+    const Buffer buffer(data);
+    return transcode<Direction>(buffer.input());
+  }
+
+  template <class Direction>
+  nb::object transcode(Input input) const {
     Error error;
     typename Direction::Scratch scratch(plan_);
     uint64_t size = 0;
     if (input.size < kLarge) {
-      if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) fail(error, nb::none());
+      if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) fail(error);
       nb::object result = new_bytes(size);
-      if (!Direction::write(plan_, input, scratch, 0, output_of(result, size), error))
-        fail(error, nb::none());
+      if (!Direction::write(plan_, input, scratch, 0, output_of(result, size), error)) fail(error);
       return result;
     }
     bool good;
@@ -153,130 +118,149 @@ class Transcoder {
       nb::gil_scoped_release release;
       good = Direction::measure(plan_, input, size_limit_, scratch, &size, error);
     }
-    if (!good) fail(error, nb::none());
+    if (!good) fail(error);
     nb::object result = new_bytes(size);
     const Output output = output_of(result, size);
     {
       nb::gil_scoped_release release;
       good = Direction::write(plan_, input, scratch, 0, output, error);
     }
-    if (!good) fail(error, nb::none());
+    if (!good) fail(error);
     return result;
   }
 
-  // The same from and to message objects. Python would do it in two lines, at twice the cost for small messages.
-  static nb::object message_to_cdr(nb::handle_t<Transcoder> self, nb::handle message) {
-    const Transcoder& transcoder = nb::cast<const Transcoder&>(self);
-    if (reinterpret_cast<PyObject*>(Py_TYPE(message.ptr())) != transcoder.message_class_.ptr())
-      self.attr("refuse")(message);
-    const nb::object proto =
-        nb::steal(PyObject_CallOneArg(transcoder.serialize_.ptr(), message.ptr()));
-    if (!proto.is_valid()) throw nb::python_error();
-    return transcoder.transcode<ProtoToCdr>(proto);
-  }
-
-  nb::object cdr_to_message(nb::handle data) const {
-    if (!from_string_.is_valid()) throw nb::type_error("this transcoder has no message class");
-    const nb::object proto = transcode<CdrToProto>(data);
-    nb::object message = nb::steal(PyObject_CallOneArg(from_string_.ptr(), proto.ptr()));
-    if (!message.is_valid()) throw nb::python_error();
-    return message;
-  }
-
+  // Returns the buffer with the results, how much of it they take, their ranges, and the errors by index.
   template <class Direction>
-  nb::list transcode_batch(nb::handle messages, size_t threads) const {
-    if (threads == 0) throw nb::value_error("threads must be 1 or more");
-    const nb::object fast =
-        nb::steal(PySequence_Fast(messages.ptr(), "a batch must be a sequence of messages"));
-    if (!fast.is_valid()) throw nb::python_error();
-
-    struct Job {
-      Buffer buffer;
-      uint64_t size = 0, mark = 0;
-      Output output{};
-    };
-    std::vector<Job> jobs;
-    // Taking a buffer can run Python code, which can change the list: so its length is asked for each time.
-    jobs.reserve(static_cast<size_t>(PySequence_Fast_GET_SIZE(fast.ptr())));
-    for (Py_ssize_t i = 0; i < PySequence_Fast_GET_SIZE(fast.ptr()); ++i) {
-      const nb::object item = nb::borrow(PySequence_Fast_GET_ITEM(fast.ptr(), i));
-      jobs.push_back(Job{Buffer(item.ptr())});
+  nb::tuple transcode_batch(nb::handle messages, nb::handle ranges, size_t threads, nb::handle into) const {
+    Batch<Direction> batch(plan_, size_limit_);
+    // Whatever is taken here is kept, and what can change its size is locked, until the end.
+    nb::object held;
+    std::deque<Buffer> buffers;
+    if (!ranges.is_none()) {
+      const Buffer places(ranges, PyBUF_FORMAT | PyBUF_C_CONTIGUOUS);
+      batch.reserve(static_cast<size_t>(places.view().len) / sizeof(Range));
+      add_ranges(buffers.emplace_back(messages).input(), places, [&](Input input) { batch.add(input); });
+    } else {
+      // A tuple of our own: taking a buffer can run Python code, which can change a list.
+      held = nb::steal(PySequence_Fast(messages.ptr(), "a batch must be a sequence of messages"));
+      if (held.is_valid()) held = nb::steal(PySequence_Tuple(held.ptr()));
+      if (!held.is_valid()) throw nb::python_error();
+      const Py_ssize_t count = PyTuple_GET_SIZE(held.ptr());
+      batch.reserve(static_cast<size_t>(count));
+      for (Py_ssize_t i = 0; i < count; ++i) {
+        PyObject* const item = PyTuple_GET_ITEM(held.ptr(), i);
+        batch.add(PyBytes_Check(item) ? input_of(item) : buffers.emplace_back(item).input());
+      }
     }
-    const size_t blocks = (jobs.size() + kBlock - 1) / kBlock;
-    std::deque<typename Direction::Scratch> scratches;
-    for (size_t i = 0; i < blocks; ++i) scratches.emplace_back(plan_);
-    Failure failure;
-
-    // Calls `step(job, scratch, error)` for each job, and keeps the error of the first job that fails.
-    const auto run = [&](auto step) {
-      nb::gil_scoped_release release;
-      run_on_threads(threads, blocks, [&](size_t block) {
-        for (size_t i = block * kBlock; i < std::min(jobs.size(), (block + 1) * kBlock); ++i) {
-          Error error;
-          if (i < failure.index && !step(jobs[i], scratches[block], error)) failure.keep(i, error);
-        }
-      });
-    };
-    run([&](Job& job, auto& scratch, Error& error) {
-      job.mark = scratch.mark();
-      return Direction::measure(plan_, job.buffer.input(), size_limit_, scratch, &job.size, error);
-    });
-    failure.check(*this);
-    nb::list results;
-    for (Job& job : jobs) {
-      const nb::object result = new_bytes(job.size);
-      job.output = output_of(result, job.size);
-      results.append(result);
+    nb::object places = new_bytes(batch.size() * sizeof(Range));
+    auto* const found = reinterpret_cast<Range*>(PyBytes_AS_STRING(places.ptr()));
+    nb::object result = into.is_none() ? new_bytearray(0) : nb::borrow(into);
+    uint64_t size;
+    for (;;) {
+      const Buffer buffer(result, PyBUF_WRITABLE);
+      const Output output = buffer.output();
+      for (size_t i = 0; i < batch.size(); ++i) {
+        if (overlap(batch[i], output)) throw nb::value_error("`into` is memory of the messages; give other memory");
+      }
+      {
+        nb::gil_scoped_release release;
+        size = batch.run(threads, output, found);
+      }
+      if (size <= output.size) break;
+      if (!into.is_none()) throw_too_small(size, output.size);
+      result = new_bytearray(size);  // The first time was to find the size.
     }
-    run([&](Job& job, auto& scratch, Error& error) {
-      return Direction::write(plan_, job.buffer.input(), scratch, job.mark, job.output, error);
-    });
-    failure.check(*this);
-    return results;
+    nb::dict errors;
+    for (size_t i = 0; i < batch.size(); ++i) {
+      if (found[i].missing()) errors[nb::int_(i)] = exception(batch.error(i), nb::int_(i));
+    }
+    return nb::make_tuple(result, size, places, errors);
   }
 
  private:
-  struct Failure {
-    std::atomic<size_t> index{SIZE_MAX};
-    Error error;
-    std::mutex mutex;
+  static bool overlap(Input input, Output output) {
+    const auto a = reinterpret_cast<uintptr_t>(input.data), b = reinterpret_cast<uintptr_t>(output.data);
+    return a < b + output.size && b < a + input.size;
+  }
 
-    void keep(size_t i, const Error& reason) {
-      const std::lock_guard<std::mutex> guard(mutex);
-      if (i >= index) return;
-      index = i;
-      error = reason;
-    }
+  static nb::object error_class(const char* name) {
+    return nb::module_::import_("rosidl_adapter_proto.transcode.error").attr(name);
+  }
 
-    void check(const Transcoder& transcoder) const {
-      if (index != SIZE_MAX) transcoder.fail(error, nb::int_(index.load()));
-    }
-  };
-
-  [[noreturn]] void fail(const Error& error, nb::object batch_index) const {
-    const std::string path = field_path(error, plan_), text = reason(error);
-    const nb::object type =
-        nb::module_::import_("rosidl_adapter_proto.transcode.error").attr("TranscodeError");
-    const nb::object exception = type(type_name_, path, error.offset, text, batch_index);
-    PyErr_SetObject(type.ptr(), exception.ptr());
+  [[noreturn]] static void raise(const nb::object& exception) {
+    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
     throw nb::python_error();
   }
+
+  [[noreturn]] static void throw_too_small(uint64_t needed, uint64_t size) {
+    raise(error_class("BufferTooSmallError")(needed, size));
+  }
+
+  nb::object exception(const Error& error, nb::object batch_index) const {
+    const std::string path = field_path(error, plan_), text = reason(error);
+    return error_class("TranscodeError")(type_name_, path, error.offset, text, batch_index);
+  }
+
+  [[noreturn]] void fail(const Error& error) const { raise(exception(error, nb::none())); }
 
   Plan plan_;
   std::string type_name_;
   uint64_t size_limit_;
+};
+
+// The two directions from and to message objects. Python would do it in two lines, at twice the cost for small
+// messages.
+class Codec {
+ public:
+  Codec(nb::handle_t<Transcoder> transcoder, nb::object message_class)
+      : owner_(nb::borrow(transcoder)),
+        transcoder_(nb::cast<const Transcoder&>(transcoder)),
+        message_class_(std::move(message_class)),
+        from_string_(message_class_.attr("FromString")),
+        // The method of the class: protobuf looks every name up among the fields of a message first.
+        serialize_(message_class_.attr("SerializeToString")) {}
+
+  nb::object to_cdr(nb::handle self, nb::handle message) const {
+    if (reinterpret_cast<PyObject*>(Py_TYPE(message.ptr())) != message_class_.ptr())
+      self.attr("_refuse")(message);
+    nb::object proto;
+    try {
+      proto = call(serialize_, message);
+    } catch (nb::python_error& error) {
+      self.attr("_refuse_to_serialize")(error.value());
+      throw;
+    }
+    return transcoder_.transcode<ProtoToCdr>(proto);
+  }
+
+  nb::object from_cdr(nb::handle, nb::handle data) const {
+    return call(from_string_, transcoder_.transcode<CdrToProto>(data));
+  }
+
+ private:
+  static nb::object call(nb::handle function, nb::handle argument) {
+    nb::object result = nb::steal(PyObject_CallOneArg(function.ptr(), argument.ptr()));
+    if (!result.is_valid()) throw nb::python_error();
+    return result;
+  }
+
+  nb::object owner_;
+  const Transcoder& transcoder_;  // of the owner
   nb::object message_class_, from_string_, serialize_;
 };
 
 nb::tuple packed_fields(nb::handle serialize, nb::handle object, nb::args numbers) {
-  const nb::object serialized = nb::steal(PyObject_CallOneArg(serialize.ptr(), object.ptr()));
-  if (!serialized.is_valid()) throw nb::python_error();
-  const auto message = nb::cast<nb::bytes>(serialized);
+  const nb::object message = nb::steal(PyObject_CallOneArg(serialize.ptr(), object.ptr()));
+  if (!message.is_valid()) throw nb::python_error();
+  if (!PyBytes_Check(message.ptr())) throw nb::type_error("serialize must return bytes");
   std::vector<uint64_t> wanted(numbers.size());
   std::vector<Slice> slices(numbers.size());
-  for (size_t i = 0; i < wanted.size(); ++i) wanted[i] = nb::cast<uint64_t>(numbers[i]);
-  const auto* begin = static_cast<const uint8_t*>(message.data());
-  if (!find_packed_fields(begin, begin + message.size(), wanted.data(), wanted.size(), slices.data()))
+  for (size_t i = 0; i < wanted.size(); ++i) {
+    wanted[i] = PyLong_AsUnsignedLongLong(nb::handle(numbers[i]).ptr());
+    if (PyErr_Occurred() != nullptr) throw nb::python_error();
+  }
+  const Input input = input_of(message);
+  if (!find_packed_fields(input.data, input.data + input.size, wanted.data(), wanted.size(), slices.data()))
     throw nb::value_error("not a message as protobuf serializes it");
   nb::object result = nb::steal(PyTuple_New(static_cast<Py_ssize_t>(slices.size())));
   if (!result.is_valid()) throw nb::python_error();
@@ -289,6 +273,63 @@ nb::tuple packed_fields(nb::handle serialize, nb::handle object, nb::args number
   return nb::borrow<nb::tuple>(result);
 }
 
+// The object behind `self`. It is missing where a class derives from ours and does not call its `__init__`.
+template <class T>
+const T& self_as(PyObject* self) {
+  if (!nb::inst_ready(self)) {
+    PyErr_SetString(PyExc_TypeError, "__init__ of the base class has not been called");
+    throw nb::python_error();
+  }
+  return *nb::inst_ptr<T>(self);
+}
+
+// Runs C++ that CPython calls: what it throws becomes the exception of Python.
+template <class Function>
+PyObject* called_from_python(Function function) noexcept {
+  try {
+    return function().release().ptr();
+  } catch (nb::python_error& error) {
+    error.restore();
+  } catch (const std::bad_alloc&) {
+    PyErr_NoMemory();
+  } catch (const std::exception& error) {
+    PyErr_SetString(PyExc_RuntimeError, error.what());
+  }
+  return nullptr;
+}
+
+template <class Direction>
+PyObject* transcode(PyObject* self, PyObject* data) {
+  return called_from_python([&] { return self_as<Transcoder>(self).transcode<Direction>(data); });
+}
+
+PyObject* codec_to_cdr(PyObject* self, PyObject* message) {
+  return called_from_python([&] { return self_as<Codec>(self).to_cdr(self, message); });
+}
+
+PyObject* codec_from_cdr(PyObject* self, PyObject* data) {
+  return called_from_python([&] { return self_as<Codec>(self).from_cdr(self, data); });
+}
+
+// Methods as CPython itself has them: the cheapest to call, and unlike those of nanobind they have signatures
+// for `inspect` and can be pickled.
+PyMethodDef transcoder_methods[] = {
+    {"cdr_to_proto", transcode<CdrToProto>, METH_O,
+     "cdr_to_proto($self, data, /)\n--\n\nTurn a serialized ROS message into a serialized protobuf message."},
+    {"proto_to_cdr", transcode<ProtoToCdr>, METH_O,
+     "proto_to_cdr($self, data, /)\n--\n\nTurn a serialized protobuf message into a serialized ROS message."},
+    {nullptr, nullptr, 0, nullptr}};
+PyType_Slot transcoder_slots[] = {{Py_tp_methods, transcoder_methods}, {0, nullptr}};
+
+PyMethodDef codec_methods[] = {
+    {"to_cdr", codec_to_cdr, METH_O,
+     "to_cdr($self, message, /)\n--\n\nTurn a protobuf message into a serialized ROS message."},
+    {"from_cdr", codec_from_cdr, METH_O,
+     "from_cdr($self, data, /)\n--\n\nTurn a serialized ROS message into a protobuf message."},
+    {"__class_getitem__", Py_GenericAlias, METH_O | METH_CLASS, "Codec[MessageT] is Codec."},
+    {nullptr, nullptr, 0, nullptr}};
+PyType_Slot codec_slots[] = {{Py_tp_methods, codec_methods}, {0, nullptr}};
+
 }  // namespace
 }  // namespace rosidl_proto
 
@@ -299,20 +340,14 @@ NB_MODULE(_core, module) {
   nb::set_leak_warnings(false);
   module.def("packed_fields", &packed_fields, nb::arg("serialize"), nb::arg("message"), nb::arg("numbers"),
              "Return the bytes of packed repeated fields of a message, by their numbers.");
-  nb::class_<Transcoder>(module, "Transcoder")
-      .def(nb::init<nb::bytes, std::string, uint64_t, nb::object>(), nb::arg("plan"), nb::arg("type_name"),
-           nb::arg("size_limit"), nb::arg("message_class") = nb::none())
-      .def("message_to_cdr", &Transcoder::message_to_cdr, nb::arg("source").none(),
-           "Turn a protobuf message into a serialized ROS message.")
-      .def("cdr_to_message", &Transcoder::cdr_to_message, nb::arg("data").none(),
-           "Turn a serialized ROS message into a protobuf message.")
+  nb::class_<Transcoder>(module, "Transcoder", nb::type_slots(transcoder_slots))
+      .def(nb::init<nb::bytes, std::string, uint64_t>(), nb::arg("plan"), nb::arg("type_name"),
+           nb::arg("size_limit"))
       .def_prop_ro("type_name", &Transcoder::type_name, "The ROS type, such as `sensor_msgs/msg/Imu`.")
-      .def("cdr_to_proto", &Transcoder::transcode<CdrToProto>, nb::arg("data").none(),
-           "Turn a serialized ROS message into a serialized protobuf message.")
-      .def("proto_to_cdr", &Transcoder::transcode<ProtoToCdr>, nb::arg("data").none(),
-           "Turn a serialized protobuf message into a serialized ROS message.")
-      .def("cdr_to_proto_batch", &Transcoder::transcode_batch<CdrToProto>, nb::arg("messages"),
-           nb::arg("threads") = 1, "Do `cdr_to_proto` for each message, on a number of threads.")
-      .def("proto_to_cdr_batch", &Transcoder::transcode_batch<ProtoToCdr>, nb::arg("messages"),
-           nb::arg("threads") = 1, "Do `proto_to_cdr` for each message, on a number of threads.");
+      .def("_cdr_to_proto_batch", &Transcoder::transcode_batch<CdrToProto>, nb::arg(), nb::arg().none(),
+           nb::arg(), nb::arg().none())
+      .def("_proto_to_cdr_batch", &Transcoder::transcode_batch<ProtoToCdr>, nb::arg(), nb::arg().none(),
+           nb::arg(), nb::arg().none());
+  nb::class_<Codec>(module, "Codec", nb::type_slots(codec_slots))
+      .def(nb::init<nb::handle_t<Transcoder>, nb::object>(), nb::arg("transcoder"), nb::arg("message_class"));
 }

@@ -7,18 +7,16 @@ fault); 130 interrupted.
 
 from __future__ import annotations
 
+import importlib
 import io
+import pkgutil
 import sys
 import traceback
 
 import click
 
-from rosidl_adapter_proto.cli.completion import completion_command
+from rosidl_adapter_proto.cli import commands
 from rosidl_adapter_proto.cli.configuration import ConfiguredGroup
-from rosidl_adapter_proto.cli.generate import generate_command
-from rosidl_adapter_proto.cli.hook import cmake_dir_command, hook_group
-from rosidl_adapter_proto.cli.list import list_command
-from rosidl_adapter_proto.cli.show import show_command
 from rosidl_adapter_proto.errors import Error, RequestError
 
 EXIT_USAGE = 2
@@ -37,15 +35,8 @@ def program(debug: bool) -> None:
     """
 
 
-for command in (
-    generate_command,
-    list_command,
-    show_command,
-    hook_group,
-    cmake_dir_command,
-    completion_command,
-):
-    program.add_command(command)
+for module in pkgutil.iter_modules(commands.__path__):
+    program.add_command(importlib.import_module(f"{commands.__name__}.{module.name}").command)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
 from rosidl_adapter_proto.errors import Error
-from rosidl_adapter_proto.generate.configuration import NUMBERINGS
+from rosidl_adapter_proto.generate import Options
 from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Setting
 from rosidl_adapter_proto.interfaces import store
-from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -33,42 +34,54 @@ def complete_name(context: click.Context, parameter: click.Parameter, incomplete
     return sorted(name for name in names if name.startswith(incomplete))
 
 
+_COMPLETIONS = {"distro": complete_distro}
+_PATH = click.Path(path_type=Path)
+_TYPES: dict[Kind, Any] = {
+    Kind.FLAG: bool,
+    Kind.TEXT: str,
+    Kind.PATH: _PATH,
+    Kind.NAMES: str,
+    Kind.PATHS: _PATH,
+}
+
+
+def setting_option(name: str) -> Callable[[Command], Command]:
+    """Return the decorator that gives a command the option of a setting."""
+    setting = SETTINGS[name]
+    is_flag = setting.kind is Kind.FLAG
+    declarations = [f"--{name}/--no-{name}" if is_flag else f"--{name}"]
+    if setting.short:
+        declarations.append(f"-{setting.short}")
+    return click.option(
+        *declarations,
+        type=click.Choice(setting.choices) if setting.choices else _TYPES[setting.kind],
+        default=setting.default,
+        multiple=setting.kind in (Kind.NAMES, Kind.PATHS),
+        show_default=not is_flag and setting.default is not None,
+        metavar=setting.metavar,
+        help=setting.help,
+        shell_complete=_COMPLETIONS.get(name),
+    )
+
+
 def source_options(command: Command) -> Command:
     """Add the options that say where definitions come from."""
-    command = click.option(
-        "--distro",
-        metavar="NAME",
-        shell_complete=complete_distro,
-        help="The ROS distribution whose embedded definitions stand in for packages found nowhere else "
-        "(default: $ROS_DISTRO, else the newest).",
-    )(command)
-    return click.option(
-        "--include",
-        "-I",
-        type=click.Path(path_type=Path),
-        multiple=True,
-        help="A package folder, or a folder of packages, to find definitions in. May be repeated.",
-    )(command)
+    return setting_option("include")(setting_option("distro")(command))
 
 
-def schema_options(command: Command) -> Command:
-    """Add the options that say how the `.proto` files are made."""
-    command = click.option(
-        "--events/--no-events",
-        default=False,
-        help="Include the _Event messages of service introspection.",
-    )(command)
-    command = click.option(
-        "--lock-file",
-        type=click.Path(path_type=Path),
-        default=Path(LOCK_FILE_NAME),
-        show_default=True,
-        help="Where sequential numbers are kept; commit it.",
-    )(command)
-    return click.option(
-        "--numbering",
-        type=click.Choice(NUMBERINGS),
-        default=HashNumbering.name,
-        show_default=True,
-        help="How fields are numbered: from a hash of their names, or in sequence with a lock file.",
-    )(command)
+def generate_options(settings: Iterable[Setting]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return the decorator that gives a command options of how to generate, which reach it as `options`."""
+    rows = tuple(settings)
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def with_options(**values: Any) -> Any:
+            return command(
+                options=Options.of({each.name: values.pop(each.attribute) for each in rows}), **values
+            )
+
+        for each in reversed(rows):
+            with_options = setting_option(each.name)(with_options)
+        return with_options
+
+    return decorate

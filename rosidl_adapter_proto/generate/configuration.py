@@ -7,14 +7,13 @@ import os
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
 from rosidl_adapter_proto.errors import RequestError
-from rosidl_adapter_proto.generate.request import Options, Request, find_request, is_path
+from rosidl_adapter_proto.generate.request import Request, find_request, is_path
+from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Options, Setting
 from rosidl_adapter_proto.interfaces.catalog import Catalog
-from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME, HashNumbering, SequentialNumbering
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -22,45 +21,6 @@ else:
     import tomli as tomllib
 
 SECTION = "tool.rosidl-proto"
-
-
-class Kind(Enum):
-    """What a setting is."""
-
-    NAMES = 1
-    PATHS = 2
-    FLAG = 3
-    TEXT = 4
-    PATH = 5
-
-
-_KIND_TEXTS = {
-    Kind.NAMES: "a list of strings",
-    Kind.PATHS: "a list of strings",
-    Kind.FLAG: "true or false",
-    Kind.TEXT: "a string",
-    Kind.PATH: "a string",
-}
-
-
-NUMBERINGS = (HashNumbering.name, SequentialNumbering.name)
-
-SETTINGS = {
-    "packages": Kind.NAMES,
-    "output": Kind.PATH,
-    "deps": Kind.FLAG,
-    "numbering": Kind.TEXT,
-    "lock-file": Kind.PATH,
-    "events": Kind.FLAG,
-    "python-root": Kind.TEXT,
-    "include": Kind.PATHS,
-    "distro": Kind.TEXT,
-}
-"""Every setting: what to generate, and the options of the command line by their names."""
-
-OUTPUT_NAME = "generated"
-_BESIDE_CONFIGURATION = {"output": OUTPUT_NAME, "lock-file": LOCK_FILE_NAME}
-"""Paths that are not set are beside the configuration too, wherever the program runs."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +49,7 @@ class Configuration:
         request, catalog = find_request(
             values["packages"], include, values.get("distro"), values.get("deps", True)
         )
-        default = Options()
-        options = Options(
-            values.get("numbering", default.numbering),
-            Path(values["lock-file"]),
-            values.get("events", default.events),
-            values.get("python-root", default.python_root),
-        )
-        return request, catalog, options
+        return request, catalog, Options.of(values)
 
 
 def find_configuration(folder: Path) -> Configuration | None:
@@ -133,58 +86,47 @@ def _read_toml(text: str) -> Any:
 
 
 def _read_ini(text: str) -> Any:
-    """Return the section of a setup.cfg, with its strings as what they stand for: lists have an entry a line."""
+    """Return the section of a setup.cfg, with its strings as what they stand for."""
     parser = configparser.ConfigParser(interpolation=None)
     parser.read_string(text)
     if SECTION not in parser:
         return None
-    return {name: _from_ini(SETTINGS.get(name), value) for name, value in parser[SECTION].items()}
-
-
-def _from_ini(kind: Kind | None, value: str) -> Any:
-    if kind in (Kind.NAMES, Kind.PATHS):
-        return [line.strip() for line in value.replace(",", "\n").splitlines() if line.strip()]
-    if kind is Kind.FLAG:
-        return configparser.ConfigParser.BOOLEAN_STATES.get(value.lower(), value)
-    return value
+    return {
+        name: SETTINGS[name].from_text(value) if name in SETTINGS else value
+        for name, value in parser[SECTION].items()
+    }
 
 
 def _values(section: Any, file: Path) -> dict[str, Any]:
+    """Return the values of a section; paths that are not set are beside the configuration, wherever the program runs.
+
+    Raises:
+        RequestError: A setting does not exist or is of another kind.
+    """
     if not isinstance(section, dict):
         raise RequestError(f"{file}: [{SECTION}] must be a table")
-    values: dict[str, Any] = {name: _path(path, file) for name, path in _BESIDE_CONFIGURATION.items()}
+    unset = [each for each in SETTINGS.values() if each.kind is Kind.PATH and each.default is not None]
+    values: dict[str, Any] = {each.name: _path(str(each.default), file) for each in unset}
     for name, value in section.items():
         if name not in SETTINGS:
             raise RequestError(
                 f"{file}: [{SECTION}] has no setting {name!r}; it has {', '.join(sorted(SETTINGS))}"
             )
-        values[name] = _value(name, value, file)
+        try:
+            SETTINGS[name].check(value)
+        except ValueError as error:
+            raise RequestError(f"{file}: [{SECTION}] {name} {error}") from None
+        values[name] = _located(SETTINGS[name], value, file)
     return values
 
 
-def _value(name: str, value: Any, file: Path) -> Any:
-    """Return the value of a setting, with paths relative to the current folder.
-
-    Raises:
-        RequestError: It is not of the kind that the setting has.
-    """
-    kind = SETTINGS[name]
-    if not _is_of_kind(kind, value):
-        raise RequestError(f"{file}: [{SECTION}] {name} must be {_KIND_TEXTS[kind]}")
-    if name == "numbering" and value not in NUMBERINGS:
-        choices = " or ".join(map(repr, NUMBERINGS))
-        raise RequestError(f"{file}: [{SECTION}] {name} must be {choices}, not {value!r}")
-    if kind is Kind.NAMES:
+def _located(setting: Setting, value: Any, file: Path) -> Any:
+    """Return the value of a setting, with paths relative to the current folder."""
+    if setting.kind is Kind.NAMES:
         return [_path(each, file) if _is_path(each, file.parent) else each for each in value]
-    if kind is Kind.PATHS:
+    if setting.kind is Kind.PATHS:
         return [_path(each, file) for each in value]
-    return _path(value, file) if kind is Kind.PATH else value
-
-
-def _is_of_kind(kind: Kind, value: Any) -> bool:
-    if kind in (Kind.NAMES, Kind.PATHS):
-        return isinstance(value, list) and all(isinstance(each, str) for each in value)
-    return isinstance(value, bool if kind is Kind.FLAG else str)
+    return _path(value, file) if setting.kind is Kind.PATH else value
 
 
 def _is_path(text: str, folder: Path) -> bool:

@@ -16,8 +16,6 @@ from rosidl_adapter_proto.interfaces.find import (
     installed_sources,
 )
 from rosidl_adapter_proto.interfaces.model import TypeName
-from rosidl_adapter_proto.schema.numbering import LOCK_FILE_NAME
-from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
 
 @dataclass(frozen=True)
@@ -33,23 +31,6 @@ class Request:
     packages: tuple[str, ...] = ()
     types: tuple[TypeName, ...] = ()
     dependencies: bool = True
-
-
-@dataclass(frozen=True)
-class Options:
-    """How to generate.
-
-    Attributes:
-        numbering: How fields are numbered: `hash` or `sequential`.
-        lock_file: Where sequential numbers are kept.
-        events: Whether services get their `_Event` messages.
-        python_root: The namespace package that the generated packages are in.
-    """
-
-    numbering: str = "hash"
-    lock_file: Path = Path(LOCK_FILE_NAME)
-    events: bool = False
-    python_root: str = DEFAULT_PYTHON_ROOT
 
 
 def find_catalog(include: Iterable[Path], distro: str | None, first: Sequence[Source] = ()) -> Catalog:

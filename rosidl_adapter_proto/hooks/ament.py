@@ -14,21 +14,23 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import rosidl_adapter_proto
 from rosidl_adapter_proto.errors import Error, GenerateError
 from rosidl_adapter_proto.generate import Options, Request, check_definitions, generate
-from rosidl_adapter_proto.generate.configuration import NUMBERINGS
-from rosidl_adapter_proto.generate.index import (
+from rosidl_adapter_proto.generate.manifest import read_manifest
+from rosidl_adapter_proto.generate.output_tree import install
+from rosidl_adapter_proto.generate.outputs import places
+from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.generate.settings import OPTIONS, Kind, Setting
+from rosidl_adapter_proto.generate.targets.index import (
     RESOURCE_FOLDER,
-    SHARED_FOLDERS,
     generated_packages,
     installed_package,
 )
-from rosidl_adapter_proto.generate.layout import alone_in, replace_file
-from rosidl_adapter_proto.generate.manifest import read_manifest
-from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.closure import closure
 from rosidl_adapter_proto.interfaces.find import Source, interface_source
@@ -90,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         tuple(given.interface),
         tuple(given.dependency),
         given.output,
-        Options(given.numbering, given.lock_file, given.events, given.python_root),
+        _options(given),
         given.prefix,
         given.python_folder,
     )
@@ -176,26 +178,7 @@ def install_dependencies(build: Build) -> None:
     Raises:
         GenerateError: Files cannot be written.
     """
-    folder = build.output / DEPENDENCIES_FOLDER
-    manifest = read_manifest(folder)
-    places = {**SHARED_FOLDERS, "python": build.python_folder}
-    try:
-        build.prefix.mkdir(parents=True, exist_ok=True)
-        with alone_in(build.prefix):
-            for path in manifest.outputs if manifest else ():
-                part, _, rest = path.partition("/")
-                if part in places:
-                    _install(folder / path, build.prefix / places[part] / rest)
-    except OSError as error:
-        raise GenerateError(f"cannot write to {build.prefix}: {error.strerror} ({error.filename})") from None
-
-
-def _install(file: Path, place: Path) -> None:
-    content = file.read_bytes()
-    if not place.is_file() or place.read_bytes() != content:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.unlink(missing_ok=True)  # a link of `--symlink-install` leads into the folder of another build
-        replace_file(place, content)
+    install(build.output / DEPENDENCIES_FOLDER, build.prefix, places(build.python_folder))
 
 
 COMMANDS = {
@@ -207,7 +190,6 @@ COMMANDS = {
 
 
 def _parser() -> argparse.ArgumentParser:
-    default = Options()
     parser = argparse.ArgumentParser(
         prog="python -m rosidl_adapter_proto.hooks.ament", fromfile_prefix_chars="@"
     )
@@ -216,13 +198,31 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--interface", action="append", required=True)
     parser.add_argument("--dependency", action="append", type=Path, default=[])
     parser.add_argument("--output", type=Path, required=True)
-    parser.add_argument("--numbering", choices=NUMBERINGS, default=default.numbering)
-    parser.add_argument("--lock-file", type=Path, default=default.lock_file)
-    parser.add_argument("--events", action="store_true")
-    parser.add_argument("--python-root", default=default.python_root)
+    for each in OPTIONS:
+        parser.add_argument(f"--{each.name}", type=partial(_option_value, each), default=each.default)
+    parser.add_argument("--folder", type=Path, default=Path())  # that paths of options are relative to
     parser.add_argument("--prefix", type=Path, default=Path())
     parser.add_argument("--python-folder", default="")
     return parser
+
+
+def _option_value(option: Setting, text: str) -> Any:
+    value = option.from_text(text)
+    try:
+        option.check(value)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return value
+
+
+def _options(given: argparse.Namespace) -> Options:
+    values = {each: getattr(given, each.attribute) for each in OPTIONS}
+    return Options.of(
+        {
+            each.name: given.folder / value if each.kind is Kind.PATH else value
+            for each, value in values.items()
+        }
+    )
 
 
 if __name__ == "__main__":

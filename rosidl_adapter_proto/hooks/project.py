@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rosidl_adapter_proto.generate import Request, generate
 from rosidl_adapter_proto.generate.configuration import Configuration
-from rosidl_adapter_proto.generate.index import SHARED_FOLDERS
+from rosidl_adapter_proto.generate.outputs import SHARED_FOLDERS
 
 
 @dataclass(frozen=True)

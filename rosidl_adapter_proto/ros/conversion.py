@@ -10,9 +10,9 @@ from functools import cache
 from typing import Any, Generic
 
 from rclpy.node import Node
-from rclpy.serialization import deserialize_message, serialize_message
 
 from rosidl_adapter_proto.adapter import CustomT, TypeAdapter
+from rosidl_adapter_proto.adapter.lazy import name_of
 from rosidl_adapter_proto.errors import ConversionError
 
 OnConversionError = Callable[[ConversionError, Any], object]
@@ -28,9 +28,7 @@ def serialize(adapter: type[TypeAdapter[CustomT, Any]], message: CustomT) -> byt
     Raises:
         ConversionError: A value does not fit.
     """
-    if _is_generated(adapter):  # type: ignore[arg-type]  # mypy takes classes for unhashable
-        return adapter.to_cdr(message)
-    return serialize_message(adapter.convert_to_ros_message(message))
+    return (adapter.codec or adapter).to_cdr(message)
 
 
 def deserialize(adapter: type[TypeAdapter[CustomT, Any]], data: bytes) -> CustomT:
@@ -39,26 +37,8 @@ def deserialize(adapter: type[TypeAdapter[CustomT, Any]], data: bytes) -> Custom
     Raises:
         ConversionError: The bytes are not such a message, or a value does not fit.
     """
-    if _is_generated(adapter):  # type: ignore[arg-type]  # mypy takes classes for unhashable
-        return adapter.from_cdr(data)
-    try:
-        message: Any = deserialize_message(data, adapter.ros_message_type)
-    except Exception as error:  # rclpy raises errors of several kinds
-        reason = f"{len(data)} bytes are not a serialized message of this type: {error}"
-        raise ConversionError(_type_name(adapter), "", reason) from error
-    custom: CustomT = adapter.convert_to_custom(message)
-    return custom
-
-
-@cache
-def _is_generated(adapter: type) -> bool:
-    """Return whether the conversions of an adapter belong to its fields, so that the transcoder does the same.
-
-    A user may write an adapter for another protobuf class, with conversions of its own.
-    """
-    names = ("fields", "custom_type", "convert_to_ros_message", "convert_to_custom")
-    owners = {next((base for base in adapter.__mro__ if name in vars(base)), None) for name in names}
-    return len(owners) == 1
+    message: CustomT = (adapter.codec or adapter).from_cdr(data)
+    return message
 
 
 def to_ros_message(adapter: type[TypeAdapter[Any, Any]], message: Any, what: str) -> Any:
@@ -82,17 +62,12 @@ def to_ros_message(adapter: type[TypeAdapter[Any, Any]], message: Any, what: str
     raise wrong_type(adapter, message, what)
 
 
-def _type_name(adapter: Any) -> str:
-    """Return the ROS name of what an adapter converts; one that was written by hand may not say it."""
-    return getattr(adapter, "type_name", None) or str(adapter.__qualname__)
-
-
 def wrong_type(adapter: type[TypeAdapter[Any, Any]], message: object, what: str) -> TypeError:
     """Return the error for something that is no message of the adapter."""
     expected, found = adapter.custom_type, type(message)
     return TypeError(
         f"{what} takes a protobuf message {expected.__module__}.{expected.__qualname__} "
-        f"(or a ROS message {_type_name(adapter)}), not {found.__module__}.{found.__qualname__}"
+        f"(or a ROS message {name_of(adapter)}), not {found.__module__}.{found.__qualname__}"
     )
 
 

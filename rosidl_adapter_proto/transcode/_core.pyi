@@ -1,10 +1,14 @@
 """The native transcoder: CDR to protobuf and back."""
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Generic, TypeVar
 
 from google.protobuf.message import Message
 from typing_extensions import Buffer
+
+from rosidl_adapter_proto.transcode.error import TranscodeError
+
+MessageT = TypeVar("MessageT", bound=Message)
 
 def packed_fields(
     serialize: Callable[[Message], bytes], message: Message, *numbers: int
@@ -21,27 +25,31 @@ def packed_fields(
     """
 
 class Transcoder:
-    def __init__(
-        self, plan: bytes, type_name: str, size_limit: int, message_class: type[Message] | None = None
-    ) -> None: ...
+    def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...
     @property
     def type_name(self) -> str:
         """The ROS type, such as `sensor_msgs/msg/Imu`."""
 
-    def message_to_cdr(self, source: Message) -> bytes:
-        """Turn a protobuf message into a serialized ROS message."""
-
-    def cdr_to_message(self, data: Buffer) -> Any:
-        """Turn a serialized ROS message into a protobuf message."""
-
-    def cdr_to_proto(self, data: Buffer) -> bytes:
+    def cdr_to_proto(self, data: Buffer, /) -> bytes:
         """Turn a serialized ROS message into a serialized protobuf message."""
 
-    def proto_to_cdr(self, data: Buffer) -> bytes:
+    def proto_to_cdr(self, data: Buffer, /) -> bytes:
         """Turn a serialized protobuf message into a serialized ROS message."""
 
-    def cdr_to_proto_batch(self, messages: Sequence[Buffer], threads: int = 1) -> list[bytes]:
-        """Do `cdr_to_proto` for each message, on a number of threads."""
+    def _cdr_to_proto_batch(
+        self, messages: Iterable[Buffer] | Buffer, ranges: Buffer | None, threads: int, into: Buffer | None, /
+    ) -> tuple[Buffer, int, bytes, dict[int, TranscodeError]]:
+        """Return the buffer with the results, how many bytes of it they take, their ranges, and the errors."""
 
-    def proto_to_cdr_batch(self, messages: Sequence[Buffer], threads: int = 1) -> list[bytes]:
-        """Do `proto_to_cdr` for each message, on a number of threads."""
+    def _proto_to_cdr_batch(
+        self, messages: Iterable[Buffer] | Buffer, ranges: Buffer | None, threads: int, into: Buffer | None, /
+    ) -> tuple[Buffer, int, bytes, dict[int, TranscodeError]]:
+        """Return the same for the other direction."""
+
+class Codec(Generic[MessageT]):
+    def __init__(self, transcoder: Transcoder, message_class: type[MessageT]) -> None: ...
+    def to_cdr(self, message: MessageT, /) -> bytes:
+        """Turn a protobuf message into a serialized ROS message."""
+
+    def from_cdr(self, data: Buffer, /) -> MessageT:
+        """Turn a serialized ROS message into a protobuf message."""

@@ -1,8 +1,8 @@
-"""The exception of the transcoder."""
+"""The exceptions of the transcoder."""
 
 from __future__ import annotations
 
-from rosidl_adapter_proto.errors import ConversionError
+from rosidl_adapter_proto.errors import ConversionError, Error
 
 
 class TranscodeError(ConversionError):
@@ -36,3 +36,23 @@ class TranscodeError(ConversionError):
     def __reduce__(self) -> tuple[type[TranscodeError], tuple[str, str, int, str, int | None]]:
         arguments = (self.type_name, self.field_path, self.byte_offset, self.reason, self.batch_index)
         return type(self), arguments
+
+
+class BufferTooSmallError(Error, ValueError):
+    """The results of a batch do not fit into the memory that was given for them, which then holds nothing of use.
+
+    Attributes:
+        needed: How many bytes the results of this batch take.
+        size: How many bytes there are.
+    """
+
+    def __init__(self, needed: int, size: int) -> None:
+        super().__init__(needed, size)
+        self.needed = needed
+        self.size = size
+
+    def __str__(self) -> str:
+        return (
+            f"the results take {self.needed} bytes and `into` has {self.size};"
+            f" give a buffer of at least {self.needed} bytes"
+        )

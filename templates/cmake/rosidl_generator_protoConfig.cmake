@@ -1,12 +1,9 @@
 # Found by rosidl_core_generators through the ament index: registers the generator of protobuf types and adapters.
 #
 # Variables that a project or the command line may set:
-#   ROSIDL_PROTO_SKIP         generate nothing
-#   ROSIDL_PROTO_NUMBERING    how fields are numbered: hash (default) or sequential
-#   ROSIDL_PROTO_LOCK_FILE    where sequential numbers are kept (default: rosidl-proto.lock of the package)
-#   ROSIDL_PROTO_EVENTS       include the _Event messages of service introspection
-#   ROSIDL_PROTO_PYTHON_ROOT  the namespace package of the generated Python packages (default: rosidl_proto)
-#   ROSIDL_PROTO_PYTHON       the Python that has rosidl_adapter_proto (default: that of the other generators)
+#   ROSIDL_PROTO_SKIP      generate nothing
+#   ROSIDL_PROTO_PYTHON    the Python that has rosidl_adapter_proto (default: that of the other generators)
+#   ROSIDL_PROTO_<OPTION>  an option of `rosidl-proto generate`; rosidl_generator_proto_arguments.cmake has which
 
 find_package(ament_cmake_core QUIET REQUIRED)
 # Generators run in the order of their registration. This one comes after that of Python, whose folder it installs to.
@@ -15,44 +12,7 @@ find_package(rosidl_generator_py QUIET)
 # `rosidl-proto hook install` writes this file, with the Python that it runs in.
 include("${CMAKE_CURRENT_LIST_DIR}/rosidl_generator_proto_python.cmake" OPTIONAL)
 
-# Sets _proto_output, _proto_command, _proto_definitions and _proto_arguments, for what rosidl_generate_interfaces() got.
-macro(_rosidl_generator_proto_arguments output)
-  set(_proto_python "${ROSIDL_PROTO_PYTHON}")
-  if(NOT _proto_python)
-    set(_proto_python "${_rosidl_generator_proto_python}")
-  endif()
-  if(NOT _proto_python)
-    find_package(Python3 REQUIRED COMPONENTS Interpreter)
-    set(_proto_python "${Python3_EXECUTABLE}")
-  endif()
-  set(_proto_command "${_proto_python}" -m rosidl_adapter_proto.hooks.ament)
-  set(_proto_output "${output}")
-  set(_proto_arguments --package "${PROJECT_NAME}" --output "${_proto_output}")
-
-  # The definitions as they were written, and not the .idl files that ROS makes of them: errors name these.
-  set(_proto_definitions "")
-  foreach(_tuple ${_interface_tuples})
-    list(APPEND _proto_arguments --interface "${_tuple}")
-    string(REGEX REPLACE ":([^:]*)$" "/\\1" _definition "${_tuple}")
-    list(APPEND _proto_definitions "${_definition}")
-  endforeach()
-
-  if(ROSIDL_PROTO_NUMBERING)
-    list(APPEND _proto_arguments --numbering "${ROSIDL_PROTO_NUMBERING}")
-  endif()
-  set(_proto_lock_file "${ROSIDL_PROTO_LOCK_FILE}")
-  if(NOT _proto_lock_file)
-    set(_proto_lock_file "rosidl-proto.lock")
-  endif()
-  get_filename_component(_proto_lock_file "${_proto_lock_file}" ABSOLUTE BASE_DIR "${CMAKE_CURRENT_SOURCE_DIR}")
-  list(APPEND _proto_arguments --lock-file "${_proto_lock_file}")
-  if(ROSIDL_PROTO_EVENTS)
-    list(APPEND _proto_arguments --events)
-  endif()
-  if(ROSIDL_PROTO_PYTHON_ROOT)
-    list(APPEND _proto_arguments --python-root "${ROSIDL_PROTO_PYTHON_ROOT}")
-  endif()
-endmacro()
+include("${CMAKE_CURRENT_LIST_DIR}/rosidl_generator_proto_arguments.cmake")
 
 # Runs a command of the hook now, with the arguments in _proto_arguments, and stops if it fails.
 macro(_rosidl_generator_proto_run command)

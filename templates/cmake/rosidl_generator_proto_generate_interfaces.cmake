@@ -52,16 +52,18 @@ endif()
 if(NOT rosidl_generate_interfaces_SKIP_INSTALL)
   _ament_cmake_python_register_environment_hook()
   ament_get_python_install_dir(_proto_python_install_dir)
-  install(
-    DIRECTORY "${_proto_output}/package/proto/"
-    DESTINATION "share")
-  install(
-    DIRECTORY "${_proto_output}/package/python/"
-    DESTINATION "${_proto_python_install_dir}"
-    PATTERN "__pycache__" EXCLUDE)
-  install(
-    DIRECTORY "${_proto_output}/package/index/"
-    DESTINATION "share/ament_index/resource_index")
+  # Folders and where they go, as in rosidl_adapter_proto/generate/outputs.py.
+  foreach(_proto_place
+      "proto:share"
+      "python:${_proto_python_install_dir}"
+      "index:share/ament_index/resource_index")
+    string(REGEX MATCH "^([^:]+):(.+)$" _proto_place "${_proto_place}")
+    install(
+      DIRECTORY "${_proto_output}/package/${CMAKE_MATCH_1}/"
+      DESTINATION "${CMAKE_MATCH_2}"
+      OPTIONAL
+      PATTERN "__pycache__" EXCLUDE)
+  endforeach()
   # Packages that are built at the same time may have the same dependencies: CMake would stumble over its own copies.
   list(JOIN _proto_command "\" \"" _proto_install)
   install(CODE "

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 import pytest
 
-from rosidl_adapter_proto.cli.generate import generate_command
-from rosidl_adapter_proto.generate.configuration import SETTINGS as SETTINGS_BY_NAME
+from rosidl_adapter_proto.cli.commands import generate
+from rosidl_adapter_proto.generate.settings import SETTINGS as SETTINGS_BY_NAME
 from tests.cli.conftest import Run
 from tests.folders import content, write_package
 
@@ -230,7 +230,7 @@ def test_a_wrong_setup_cfg(folder: Path, run: Run) -> None:
 def test_the_settings_are_the_options_of_the_commands() -> None:
     names = {
         "packages" if isinstance(parameter, click.Argument) else parameter.opts[0].removeprefix("--")
-        for parameter in generate_command.params
+        for parameter in generate.command.params
     }
 
     assert names - {"check", "verbose"} == set(SETTINGS_BY_NAME)

@@ -20,8 +20,8 @@ FILES = [
     "python/rosidl_proto/my_msgs/msg/A_adapter.py",
     "python/rosidl_proto/my_msgs/msg/__init__.py",
     "python/rosidl_proto/my_msgs/msg/py.typed",
-    "pyproject.toml",
     "index/rosidl_proto/my_msgs",
+    "pyproject.toml",
 ]
 
 

@@ -24,6 +24,7 @@ def test_hook_install(folder: Path, run: Run) -> None:
     assert sorted(files) == [
         "share/ament_index/resource_index/rosidl_generator_packages/rosidl_generator_proto",
         CONFIG,
+        "share/rosidl_generator_proto/cmake/rosidl_generator_proto_arguments.cmake",
         "share/rosidl_generator_proto/cmake/rosidl_generator_proto_generate_interfaces.cmake",
         "share/rosidl_generator_proto/cmake/rosidl_generator_proto_python.cmake",
     ]

@@ -10,16 +10,17 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rosidl_adapter_proto import generate as generate_module
+import rosidl_adapter_proto
 from rosidl_adapter_proto.errors import DefinitionError, GenerateError, SchemaError
-from rosidl_adapter_proto.generate import Options, Request, Result, generate, layout, protoc
+from rosidl_adapter_proto.generate import Options, Request, Result, fingerprint, generate, output_tree, protoc
+from rosidl_adapter_proto.generate import run as run_module
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME
+from rosidl_adapter_proto.generate.render import templates_folder
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
@@ -296,21 +297,52 @@ def test_another_request_replaces_the_output(source: Path, generated: Path) -> N
     assert files_in(generated) == BASE_FILES | OWN_FILES
 
 
-@pytest.mark.parametrize(
-    "options", [Options(python_root="x"), Options(numbering="sequential"), Options(events=True)]
-)
-def test_other_options_are_noticed(options: Options, source: Path, generated: Path, tmp_path: Path) -> None:
-    if options.numbering == "sequential":
-        options = replace(options, lock_file=tmp_path / "lock")
+LOADED = """
+import sys
+from rosidl_adapter_proto.cli import main
+try:
+    main(["generate", "src", "--numbering", "sequential", "--events"])
+finally:
+    print(*(module.__file__ for module in list(sys.modules.values()) if getattr(module, "__file__", None)))
+"""
 
-    assert run(source, generated, options=options, check=True).is_stale
+
+def test_everything_that_generates_counts(source: Path, tmp_path: Path) -> None:
+    """Whatever of the program was loaded to generate is part of the fingerprint."""
+    command = [sys.executable, "-c", LOADED]
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    package = Path(rosidl_adapter_proto.__file__).parent
+    loaded = {Path(file) for file in process.stdout.split()}
+    ours = {file for file in loaded if package in file.parents and file.suffix == ".py"}
+
+    counted = fingerprint.program_files()
+
+    assert {package / "interfaces/msg.py", package / "schema/proto.py"} < ours
+    assert ours <= set(counted)
+    assert set(templates_folder().rglob("*.jinja")) <= set(counted)
+
+
+def test_another_file_of_the_program_is_noticed(
+    source: Path, generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    manifest = (generated / MANIFEST_NAME).read_bytes()
+    file = tmp_path / "changed.py"
+    file.write_text("")
+    monkeypatch.setattr(fingerprint, "program_files", lambda: [file])
+    run(source, generated)
+    with_empty_file = (generated / MANIFEST_NAME).read_bytes()
+    file.write_text("CHANGED = True\n")
+
+    run(source, generated)
+
+    assert len({manifest, with_empty_file, (generated / MANIFEST_NAME).read_bytes()}) == 3
 
 
 def test_another_version_of_the_program_is_noticed(
     source: Path, generated: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     manifest = (generated / MANIFEST_NAME).read_bytes()
-    monkeypatch.setattr(generate_module, "version", lambda name: "9.9")
+    monkeypatch.setattr(fingerprint, "version", lambda name: "9.9")
 
     run(source, generated)
 
@@ -332,7 +364,7 @@ def test_edited_output_is_made_again(source: Path, generated: Path) -> None:
 
 
 def test_check_writes_nothing(source: Path, output: Path, tmp_path: Path) -> None:
-    options = Options("sequential", tmp_path / "lock")
+    options = Options(numbering="sequential", lock_file=tmp_path / "lock")
 
     result = run(source, output, options=options, check=True)
 
@@ -363,7 +395,7 @@ class TestLockFile:
 
     @pytest.fixture
     def options(self, tmp_path: Path) -> Options:
-        return Options("sequential", tmp_path / "rosidl-proto.lock")
+        return Options(numbering="sequential", lock_file=tmp_path / "rosidl-proto.lock")
 
     def test_it_keeps_numbers(self, options: Options, source: Path, output: Path) -> None:
         assert run(source, output, PACKAGES, options=options).lock_changed
@@ -421,7 +453,7 @@ class TestLockFile:
         assert not output.exists()
 
     def test_it_has_its_folder_already(self, source: Path, output: Path, tmp_path: Path) -> None:
-        options = Options("sequential", tmp_path / "no" / "lock")
+        options = Options(numbering="sequential", lock_file=tmp_path / "no" / "lock")
 
         with pytest.raises(GenerateError, match=r"^cannot write .*/no/lock: No such file or directory$"):
             run(source, output, PACKAGES, options=options)
@@ -440,13 +472,13 @@ class TestLockFile:
             raise OSError(errno.ENOSPC, "No space left on device")
 
         with monkeypatch.context() as patch:
-            patch.setattr(generate_module, "replace_file", refuse)
+            patch.setattr(run_module, "replace_file", refuse)
             with pytest.raises(GenerateError, match=r"^cannot write .*lock: No space left on device$"):
                 run(source, output, PACKAGES, options=options)
         assert content(output) == before
 
         with monkeypatch.context() as patch:
-            patch.setattr(layout, "_move", refuse)
+            patch.setattr(output_tree, "_move", refuse)
             with pytest.raises(
                 GenerateError, match=r"^cannot write to .*/out: No space left on device; nothing"
             ):
@@ -534,7 +566,7 @@ def test_interrupted_while_generating(source: Path, generated: Path) -> None:
 
 def test_what_a_killed_run_left_is_cleaned_up(source: Path, generated: Path) -> None:
     before = content(generated)
-    left_over = generated / layout.STAGING_NAME / "0"
+    left_over = generated / output_tree.STAGING_NAME / "0"
 
     left_over.parent.mkdir()
     left_over.touch()

@@ -11,7 +11,7 @@ from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import folder_source, store_source
-from tests.generate.test_adapter import PROTOC_TAKES_JSON_CONFLICTS
+from tests.things import PROTOC_TAKES_JSON_CONFLICTS
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 

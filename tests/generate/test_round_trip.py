@@ -90,7 +90,7 @@ def test_constants_equal_those_of_ros(ros_install: Generated) -> None:
     checked = 0
     for name in ros_install.messages():
         adapter = ros_install.adapter(name)
-        for constant in ros_install.sources.message(name).constants:
+        for constant in ros_install.catalog.message(name).constants:
             value = getattr(adapter.ros_message_type, constant.name)
             if isinstance(value, bytes):  # an octet
                 value = ord(value)
@@ -103,7 +103,7 @@ def test_adapters_know_the_type_of_ros(ros_install: Generated) -> None:
     """Descriptions and hashes are those of the `.json` files that ROS installs."""
     checked = 0
     for name in ros_install.interfaces:
-        file = Path(ros_install.sources.definition(name).file).with_suffix(".json")
+        file = Path(ros_install.catalog.definition(name).file).with_suffix(".json")
         content = json.loads(file.read_text())
         hashes = {each["type_name"]: each["hash_string"] for each in content["type_hashes"]}
         adapter = ros_install.adapter(name)

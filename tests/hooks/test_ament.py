@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import rosidl_adapter_proto
-from rosidl_adapter_proto.generate.index import RESOURCE_FOLDER
+from rosidl_adapter_proto.generate.targets.index import RESOURCE_FOLDER
 from rosidl_adapter_proto.hooks.ament import main
 from tests.folders import content, write_package
 

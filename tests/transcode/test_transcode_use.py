@@ -72,44 +72,6 @@ def test_large_message() -> None:
         transcode.proto_to_cdr(message.SerializeToString()[:-2] + b"aa\xff"[1:])
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
-@pytest.mark.parametrize("count", [0, 1, 64, 300])
-def test_batch(count: int, threads: int) -> None:
-    transcode, _ = transcoder(NASTY, "test/msg/Nasty")
-    messages = nasty_messages(count)
-    protos = transcode.cdr_to_proto_batch(messages, threads=threads)
-    assert protos == [transcode.cdr_to_proto(each) for each in messages]
-    assert transcode.proto_to_cdr_batch(tuple(protos), threads) == messages
-    assert transcode.proto_to_cdr_batch([bytearray(each) for each in protos], threads) == messages
-
-
-@pytest.mark.parametrize("threads", [1, 4])
-def test_batch_names_its_first_error(threads: int) -> None:
-    transcode, _ = transcoder(STRING, "test/msg/String", hashed=False)
-    good, bad = b"\0\1\0\0\2\0\0\0a\0", b"\0\1\0\0\2\0\0\0ab"
-    batch = [bad if i in (123, 200, 299) else good for i in range(300)]
-    with pytest.raises(TranscodeError) as caught:
-        transcode.cdr_to_proto_batch(batch, threads=threads)
-    assert caught.value.batch_index == 123
-    assert str(caught.value) == (
-        "test/msg/String.data at byte 9 of message 123:"
-        " the string does not end with NUL; the data is damaged or of another type"
-    )
-    with pytest.raises(TranscodeError) as caught:
-        transcode.proto_to_cdr_batch([b"", b"\x0a\x01\xff"])
-    assert caught.value.batch_index == 1
-
-
-def test_batch_arguments() -> None:
-    transcode, _ = transcoder(STRING, "test/msg/String")
-    with pytest.raises(ValueError, match="threads must be 1 or more"):
-        transcode.cdr_to_proto_batch([], threads=0)
-    with pytest.raises(TypeError, match="a batch must be a sequence of messages"):
-        transcode.cdr_to_proto_batch(5)  # type: ignore[arg-type]
-    with pytest.raises(TypeError):
-        transcode.cdr_to_proto_batch([b"\0\1\0\0\0\0\0\0", None])  # type: ignore[list-item]
-
-
 def test_threads_share_a_transcoder() -> None:
     transcode, _ = transcoder(NASTY, "test/msg/Nasty")
     messages = nasty_messages(40)

@@ -8,6 +8,9 @@ from __future__ import annotations
 import typing
 
 from rosidl_adapter_proto import adapter
+
+adapter.require_contract(1, __name__)
+
 from rosidl_adapter_proto.adapter import (
     boolean,
     check_custom,

@@ -2,12 +2,14 @@
 
 from google.protobuf.internal import builder as _builder
 
-from rosidl_adapter_proto.adapter import add_descriptor_file as _add_descriptor_file
+from rosidl_adapter_proto import adapter as _adapter
+
+_adapter.require_contract(1, __name__)
 
 import rosidl_proto.builtin_interfaces.msg.Time_pb2  # noqa: F401
 import rosidl_proto.unique_identifier_msgs.msg.UUID_pb2  # noqa: F401
 
-DESCRIPTOR = _add_descriptor_file(
+DESCRIPTOR = _adapter.add_descriptor_file(
     "sample_msgs/action/Move.proto",
     b'\n\x1dsample_msgs/action/Move.proto\x12\x15sample_msgs.action.pb\x1a!builtin_interfaces/msg/Time.proto\x1a%unique_identifier_msgs/msg/UUID.proto"!\n\tMove_Goal\x12\x14\n\x08distance\x18\xea\xbc\xca\xe4\x01 \x01(\x01">\n\x0bMove_Result\x12/\n#structure_needs_at_least_one_member\x18\x9a\xac\x98\xc2\x01 \x01(\r"%\n\rMove_Feedback\x12\x14\n\tremaining\x18\xff\x9d\xaeO \x01(\x01"\x84\x01\n\x15Move_SendGoal_Request\x127\n\x07goal_id\x18\xa2\xd5\xf43 \x01(\x0b2#.unique_identifier_msgs.msg.pb.UUID\x122\n\x04goal\x18\xf6\x94\xf4\xe6\x01 \x01(\x0b2 .sample_msgs.action.pb.Move_Goal"b\n\x16Move_SendGoal_Response\x12\x14\n\x08accepted\x18\xf2\x8b\xf8\xb0\x01 \x01(\x08\x122\n\x05stamp\x18\xc3\xd5\xba\xaa\x01 \x01(\x0b2\x1f.builtin_interfaces.msg.pb.Time"Q\n\x16Move_GetResult_Request\x127\n\x07goal_id\x18\xa2\xd5\xf43 \x01(\x0b2#.unique_identifier_msgs.msg.pb.UUID"e\n\x17Move_GetResult_Response\x12\x12\n\x06status\x18\xc0\xe9\x81\xd8\x01 \x01(\x05\x126\n\x06result\x18\xfc\x89\xab\x9b\x01 \x01(\x0b2".sample_msgs.action.pb.Move_Result"\x8b\x01\n\x14Move_FeedbackMessage\x127\n\x07goal_id\x18\xa2\xd5\xf43 \x01(\x0b2#.unique_identifier_msgs.msg.pb.UUID\x12:\n\x08feedback\x18\xb7\xbf\xa5\x91\x01 \x01(\x0b2$.sample_msgs.action.pb.Move_Feedback2\xdb\x01\n\x04Move\x12g\n\x08SendGoal\x12,.sample_msgs.action.pb.Move_SendGoal_Request\x1a-.sample_msgs.action.pb.Move_SendGoal_Response\x12j\n\tGetResult\x12-.sample_msgs.action.pb.Move_GetResult_Request\x1a..sample_msgs.action.pb.Move_GetResult_Responseb\x06proto3',
     __file__,

@@ -2,7 +2,9 @@
 
 import typing as _typing
 
-from rosidl_adapter_proto.adapter import lazy_exports as _lazy_exports
+from rosidl_adapter_proto import adapter as _adapter
+
+_adapter.require_contract(1, __name__)
 
 if _typing.TYPE_CHECKING:
     from rosidl_proto.sample_msgs.action.Move_adapter import MoveAdapter as MoveAdapter
@@ -78,7 +80,7 @@ __all__ = (
 )
 
 if not _typing.TYPE_CHECKING:
-    __getattr__, __dir__ = _lazy_exports(
+    __getattr__, __dir__ = _adapter.lazy_exports(
         __name__,
         {
             "MoveAdapter": "Move_adapter",

@@ -2,9 +2,11 @@
 
 from google.protobuf.internal import builder as _builder
 
-from rosidl_adapter_proto.adapter import add_descriptor_file as _add_descriptor_file
+from rosidl_adapter_proto import adapter as _adapter
 
-DESCRIPTOR = _add_descriptor_file(
+_adapter.require_contract(1, __name__)
+
+DESCRIPTOR = _adapter.add_descriptor_file(
     "sample_msgs/msg/Item.proto",
     b'\n\x1asample_msgs/msg/Item.proto\x12\x12sample_msgs.msg.pb"a\n\x04Item\x12\x11\n\x06weight\x18\xaa\xb2\xb5> \x01(\x01\x12\x10\n\x04kind\x18\xab\x89\x93\xde\x01 \x01(\r\x12\x11\n\x06letter\x18\x97\x83\x8cp \x01(\r\x12\x0e\n\x03a_b\x18\xbc\x83\xadF \x01(\x0f\x12\r\n\x02aB\x18\x9b\x80\xb6/ \x01(\x0f:\x02X\x01b\x06proto3',
     __file__,

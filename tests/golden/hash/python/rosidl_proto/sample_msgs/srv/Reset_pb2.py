@@ -2,9 +2,11 @@
 
 from google.protobuf.internal import builder as _builder
 
-from rosidl_adapter_proto.adapter import add_descriptor_file as _add_descriptor_file
+from rosidl_adapter_proto import adapter as _adapter
 
-DESCRIPTOR = _add_descriptor_file(
+_adapter.require_contract(1, __name__)
+
+DESCRIPTOR = _adapter.add_descriptor_file(
     "sample_msgs/srv/Reset.proto",
     b'\n\x1bsample_msgs/srv/Reset.proto\x12\x12sample_msgs.srv.pb""\n\rReset_Request\x12\x11\n\x05delay\x18\x91\xb0\xea\x94\x01 \x01(\x0f"&\n\x0eReset_Response\x12\x14\n\x08accepted\x18\xf2\x8b\xf8\xb0\x01 \x01(\x082V\n\x05Reset\x12M\n\x04Call\x12!.sample_msgs.srv.pb.Reset_Request\x1a".sample_msgs.srv.pb.Reset_Responseb\x06proto3',
     __file__,

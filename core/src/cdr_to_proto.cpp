@@ -1,0 +1,65 @@
+#include <limits>
+
+#include "cdr_reader.hpp"
+#include "protobuf_sinks.hpp"
+#include "rosidl_adapter_proto/transcode.hpp"
+
+namespace rosidl_proto {
+
+bool Lengths::grow() {
+  const uint64_t capacity = capacity_ * 2;
+  if (capacity > std::numeric_limits<size_t>::max() / sizeof(uint32_t)) return false;
+  void* memory = std::malloc(static_cast<size_t>(capacity) * sizeof(uint32_t));
+  if (memory == nullptr) return false;
+  std::memcpy(memory, data_, static_cast<size_t>(size_) * sizeof(uint32_t));
+  if (data_ != few_) std::free(data_);
+  data_ = static_cast<uint32_t*>(memory);
+  capacity_ = capacity;
+  return true;
+}
+
+namespace {
+
+// The byte order of plain CDR; false and an error for any other encapsulation. The two bytes of options that
+// follow its identifier say nothing about plain CDR.
+bool byte_order(Input cdr, bool* swapped, Error& error) {
+  if (cdr.size < kCdrHeader) {
+    error.reason = Reason::Header;
+    error.a = cdr.size;
+    return false;
+  }
+  const unsigned id = unsigned{cdr.data[0]} << 8 | cdr.data[1];
+  if (id > 1) {
+    error.reason = Reason::Encapsulation;
+    error.a = id;
+    return false;
+  }
+  *swapped = id == 0;
+  return true;
+}
+
+}  // namespace
+
+bool measure_cdr_to_proto(const Plan& plan, Input cdr, uint64_t limit, Lengths& lengths, uint64_t* size,
+                          Error& error) noexcept {
+  bool swapped;
+  if (!byte_order(cdr, &swapped, error)) return false;
+  ProtobufSize sink(lengths, limit < kMaximumSize ? limit : kMaximumSize);
+  *size = 0;
+  return swapped ? CdrReader<true, true, ProtobufSize>(plan, cdr, sink, error).run(size)
+                 : CdrReader<false, true, ProtobufSize>(plan, cdr, sink, error).run(size);
+}
+
+bool write_cdr_to_proto(const Plan& plan, Input cdr, const Lengths& lengths, uint64_t first, Output proto,
+                        Error& error) noexcept {
+  bool swapped;
+  if (!byte_order(cdr, &swapped, error)) return false;
+  uint8_t nothing;
+  if (proto.size == 0) proto.data = &nothing;  // a sink that is nowhere has stopped
+  ProtobufWriter sink(proto, lengths, first);
+  uint8_t* out = proto.data;
+  return swapped ? CdrReader<true, false, ProtobufWriter>(plan, cdr, sink, error).run(&out)
+                 : CdrReader<false, false, ProtobufWriter>(plan, cdr, sink, error).run(&out);
+}
+
+}  // namespace rosidl_proto

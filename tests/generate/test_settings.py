@@ -1,0 +1,179 @@
+"""Every option, through every entrance: a row of the table is tested as soon as it is there."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rosidl_adapter_proto.cli import main
+from rosidl_adapter_proto.cli.commands import generate as generate_command
+from rosidl_adapter_proto.cli.commands import show as show_command
+from rosidl_adapter_proto.generate import Options, Request, Result, generate
+from rosidl_adapter_proto.generate.configuration import read_configuration
+from rosidl_adapter_proto.generate.output_tree import Changes
+from rosidl_adapter_proto.generate.settings import OPTIONS, Kind, Setting
+from rosidl_adapter_proto.generate.targets.index import GeneratedPackage, generated_packages
+from rosidl_adapter_proto.hooks import ament
+from rosidl_adapter_proto.hooks.cmake import cmake_folder
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import folder_source, store_source
+from tests.folders import write_package
+
+each_option = pytest.mark.parametrize("option", OPTIONS, ids=[each.name for each in OPTIONS])
+
+
+@pytest.fixture(autouse=True)
+def some_package(folder: Path) -> None:
+    """A package in the current folder."""
+    write_package(folder / "my_msgs", {"msg/A.msg": "bool a\n", "srv/S.srv": "---\n"})
+
+
+def other(option: Setting) -> Any:
+    """Return a value that is not the default."""
+    if option.choices:
+        return next(each for each in option.choices if each != option.default)
+    values: dict[Kind, Callable[[Any], Any]] = {
+        Kind.FLAG: lambda default: not default,
+        Kind.TEXT: lambda default: f"other_{default}",
+        Kind.PATH: lambda default: Path("other", default),
+    }
+    return values[option.kind](option.default)
+
+
+def in_toml(value: Any) -> str:
+    return json.dumps(str(value) if isinstance(value, Path) else value)
+
+
+def set_to(option: Setting, value: Any) -> Options:
+    return replace(Options(), **{option.attribute: value})
+
+
+def test_the_table_is_that_of_the_options() -> None:
+    assert [each.attribute for each in OPTIONS] == list(vars(Options()))
+    for each in OPTIONS:
+        assert each.default == getattr(Options(), each.attribute)
+        assert other(each) != each.default
+        assert each.help.endswith(".")
+
+
+@each_option
+@pytest.mark.parametrize("file", ["pyproject.toml", "setup.cfg"])
+def test_configuration(file: str, option: Setting, folder: Path) -> None:
+    value = other(option)
+    text = in_toml(value) if file == "pyproject.toml" else str(value)
+    packages = '["./my_msgs"]' if file == "pyproject.toml" else "./my_msgs"
+    Path(file).write_text(f"[tool.rosidl-proto]\npackages = {packages}\n{option.name} = {text}\n")
+
+    configuration = read_configuration(folder)
+
+    assert configuration is not None
+    assert configuration.request()[2] == set_to(option, value)
+
+
+def on_command_line(option: Setting, value: Any) -> list[str]:
+    if option.kind is Kind.FLAG:
+        return [f"--{option.name}" if value else f"--no-{option.name}"]
+    return [f"--{option.name}", str(value)]
+
+
+@each_option
+def test_generate_command(option: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
+    received: list[Options] = []
+
+    def record(request: Request, catalog: Catalog, output: Path, options: Options, **others: Any) -> Result:
+        received.append(options)
+        return Result((), Changes((), (), 0))
+
+    monkeypatch.setattr(generate_command, "generate", record)
+    value = other(option)
+
+    with pytest.raises(SystemExit):
+        main(["generate", "my_msgs", *on_command_line(option, value)])
+
+    assert received == [set_to(option, value)]
+
+
+@pytest.mark.parametrize("option", [each for each in OPTIONS if each.is_for_schema])
+def test_show_command(option: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
+    received: list[Options] = []
+    monkeypatch.setattr(show_command, "proto_text", lambda *given: received.append(given[-1]) or "")
+    value = other(option)
+
+    with pytest.raises(SystemExit):
+        main(["show", "my_msgs/A", "-I", "my_msgs", *on_command_line(option, value)])
+
+    assert received == [set_to(option, value)]
+
+
+SCRIPT = """
+cmake_minimum_required(VERSION 3.20)
+include("{folder}/rosidl_generator_proto_arguments.cmake")
+set(PROJECT_NAME my_msgs)
+set(_interface_tuples "{package}:msg/A.msg" "{package}:srv/S.srv")
+set(ROSIDL_PROTO_PYTHON python)
+set({variable} "{value}")
+_rosidl_generator_proto_arguments(build)
+list(JOIN _proto_arguments "\\n" text)
+file(WRITE arguments "${{text}}\\n")
+"""
+
+
+@each_option
+def test_cmake(option: Setting, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A variable of CMake becomes an argument, and that an option; paths are relative to the package."""
+    cmake = pytest.importorskip("cmake", reason="needs cmake")
+    value = other(option)
+    variable = f"ROSIDL_PROTO_{option.attribute.upper()}"
+    text = SCRIPT.format(folder=cmake_folder(), package=folder / "my_msgs", variable=variable, value=value)
+    Path("script.cmake").write_text(text)
+    received: list[Options] = []
+    monkeypatch.setattr(ament, "check_definitions", lambda *given: received.append(given[-1]))
+
+    subprocess.run([Path(cmake.CMAKE_BIN_DIR, "cmake"), "-P", "script.cmake"], check=True)
+    code = ament.main(["check", "@arguments"])
+
+    assert code == 0
+    options = replace(Options(), lock_file=folder / Options().lock_file)
+    value = folder / value if option.kind is Kind.PATH else value
+    assert received == [replace(options, **{option.attribute: value})]
+
+
+def test_a_wrong_value_from_cmake(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        ament.main(["check", "--package", "p", "--interface", "i", "--output", "o", "--events", "maybe"])
+
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.endswith(" error: argument --events: must be true or false\n")
+
+
+@each_option
+def test_what_changes_the_output_is_noticed(option: Setting, folder: Path) -> None:
+    """A run with another value does not take the output for its own, and the index tells the value."""
+    catalog = Catalog((folder_source(folder / "my_msgs"), store_source("kilted")))
+    request = Request(("my_msgs",))
+    generate(request, catalog, folder / "out")
+    options = set_to(option, other(option))
+
+    result = generate(request, catalog, folder / "out", options, check=True)
+
+    assert result.is_stale == option.changes_output
+    package = generated_packages(catalog.packages["my_msgs"], catalog, options)["my_msgs"]
+    assert json.loads(package.to_json()).get(option.attribute) == (
+        other(option) if option.changes_output else None
+    )
+    assert GeneratedPackage.from_json(package.to_json()) == package
+
+
+@each_option
+def test_the_documents_have_it(option: Setting) -> None:
+    docs = Path(__file__).parents[2] / "docs"
+
+    assert f"`--{option.name}`" in (docs / "command-line.md").read_text(encoding="utf-8")
+    variable = f"`ROSIDL_PROTO_{option.attribute.upper()}`"
+    assert variable in (docs / "build-colcon.md").read_text(encoding="utf-8")
