@@ -13,7 +13,7 @@ from google.protobuf.message import Message
 from rosidl_adapter_proto.adapter.values import NO_SEQUENCES, absent_or_exactly, each, float32, in_range
 
 # The ROS array type of each numeric type: what array.array and numpy call it.
-_NUMPY_TYPES = {
+NUMPY_TYPES = {
     "b": "|i1",
     "B": "|u1",
     "h": "<i2",
@@ -35,7 +35,7 @@ def numbers(values: Any, typecode: str) -> Any:
     if type(values) is array and values.typecode == typecode:
         return values
     dtype = getattr(values, "dtype", None)
-    if dtype is not None and dtype.str == _NUMPY_TYPES[typecode] and values.ndim == 1:
+    if dtype is not None and dtype.str == NUMPY_TYPES[typecode] and values.ndim == 1:
         return values
     if isinstance(values, NO_SEQUENCES) and not (typecode in "bB" and isinstance(values, _BYTES)):
         raise TypeError(f"expected a sequence of numbers, not {type(values).__name__}")
@@ -93,14 +93,14 @@ def _native_packed_fields(message_class: Any) -> Callable[..., tuple[bytes, ...]
 
 def array_of(data: bytes, typecode: str) -> Any:
     """Return little-endian bytes as a numpy array of the C type of `typecode`."""
-    return _numpy().frombuffer(data, _NUMPY_TYPES[typecode])
+    return _numpy().frombuffer(data, NUMPY_TYPES[typecode])
 
 
 def elements(field: Any, typecode: str) -> Any:
     """Return a repeated number field as an array (`array.array` or numpy) of the C type of `typecode`."""
     # Newer protobuf runtimes give numpy the whole array at once; for others array.array is faster than numpy.
     if hasattr(field, "__array__") and typecode not in "hH":
-        return _numpy().asarray(field, dtype=_NUMPY_TYPES[typecode])
+        return _numpy().asarray(field, dtype=NUMPY_TYPES[typecode])
     return numbers(field, typecode)
 
 

@@ -67,7 +67,7 @@ def find_ros_class(adapter: Any) -> Any:
             found = getattr(found, name)
         except AttributeError:
             raise RosNotFoundError(
-                f"{adapter.type_name}: {module_name} has no {path}; "
+                f"{name_of(adapter)}: {module_name} has no {path}; "
                 "the installed ROS package is of another version than the generated adapter"
             ) from None
     return found
