@@ -131,7 +131,8 @@ def add_to_distribution(distribution: Any, folder: Path, command: Any) -> Path |
         if name not in distribution.packages:
             distribution.packages.append(name)
         distribution.package_dir[name] = os.path.relpath(package_folder)
-        distribution.package_data[name] = ["*.pyi", "py.typed"]
+        files = [file for file in sorted(package_folder.iterdir()) if file.is_file()]
+        distribution.package_data[name] = [file.name for file in files if file.suffix != ".py"]
     for file, place in project.shared_files():
         distribution.data_files.append((os.path.dirname(place), [os.path.relpath(file)]))
     return project.root_folder

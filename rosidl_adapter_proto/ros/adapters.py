@@ -13,12 +13,10 @@ from google.protobuf.message import Message
 from rosidl_adapter_proto.adapter import ActionAdapter, ServiceAdapter, TypeAdapter
 from rosidl_adapter_proto.errors import Error
 from rosidl_adapter_proto.ros.type_hash import check_type_hash
+from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
 if TYPE_CHECKING:
     from rclpy.impl.rcutils_logger import RcutilsLogger
-
-DEFAULT_PYTHON_ROOT = "rosidl_proto"
-"""The namespace package of generated code, unless it was generated with another one."""
 
 
 class RosMessage(Protocol):

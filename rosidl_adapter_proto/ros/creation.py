@@ -25,27 +25,32 @@ if TYPE_CHECKING:
     from rclpy.node import Node
 
 
-def create_publisher(node: Node, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Any:
+def create_publisher(node: Node, *arguments: Any, **options: Any) -> Any:
     """Create a publisher."""
-    ros_type, adapter = resolve(MESSAGE, msg_type, node.get_logger())
-    publisher = node.create_publisher(ros_type, topic, qos_profile, **options)
-    return publisher if adapter is None else _publishing(publisher, Publisher, adapter)
+    return _create_publisher(node, node.create_publisher, Publisher, *arguments, **options)
 
 
-def create_lifecycle_publisher(node: Any, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Any:
+def create_lifecycle_publisher(node: Any, *arguments: Any, **options: Any) -> Any:
     """Create a publisher that sends only while its lifecycle node is active."""
+    return _create_publisher(node, node.create_lifecycle_publisher, LifecyclePublisher, *arguments, **options)
+
+
+def _create_publisher(
+    node: Node,
+    create: Callable[..., Any],
+    converting_class: type[Publisher[Any]],
+    msg_type: Any,
+    topic: str,
+    qos_profile: Any,
+    **options: Any,
+) -> Any:
     ros_type, adapter = resolve(MESSAGE, msg_type, node.get_logger())
-    publisher = node.create_lifecycle_publisher(ros_type, topic, qos_profile, **options)
-    return publisher if adapter is None else _publishing(publisher, LifecyclePublisher, adapter)
-
-
-def _publishing(publisher: Any, publisher_class: type[Publisher[Any]], adapter: Any) -> Publisher[Any]:
+    if adapter is None:
+        return create(ros_type, topic, qos_profile, **options)
+    to_cdr = _codec(adapter).to_cdr  # first, so that nothing is left on the node if it cannot be made
+    publisher = create(ros_type, topic, qos_profile, **options)
     return convert_in(
-        publisher,
-        publisher_class,
-        adapter=adapter,
-        _custom_type=adapter.custom_type,
-        _to_cdr=_codec(adapter).to_cdr,
+        publisher, converting_class, adapter=adapter, _custom_type=adapter.custom_type, _to_cdr=to_cdr
     )
 
 

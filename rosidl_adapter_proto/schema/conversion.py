@@ -10,7 +10,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, ScalarValue, Shape, TypeName
+from rosidl_adapter_proto.interfaces.model import (
+    EMPTY_STRUCT_FIELD,
+    Action,
+    Interface,
+    ScalarValue,
+    Service,
+    Shape,
+    TypeName,
+)
 from rosidl_adapter_proto.interfaces.scalars import Family, Scalar
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage
 
@@ -325,3 +333,32 @@ CARRIERS: Mapping[str, Carrier] = {
     "double": Carrier.FIXED,
 }
 """How protobuf has an array of numbers, for each type that it may have there."""
+
+
+def ros_class(name: TypeName, interface: Interface) -> str:
+    """Return where ROS has the Python class of a type: `module:Class`."""
+    path = interface.name.name
+    if isinstance(interface, Service):
+        path += _ros_part(name, interface)
+    elif isinstance(interface, Action):
+        implementation = {
+            interface.send_goal: "SendGoalService",
+            interface.get_result: "GetResultService",
+        }
+        own = {
+            interface.goal.name: "Goal",
+            interface.result.name: "Result",
+            interface.feedback.name: "Feedback",
+            interface.feedback_message.name: "Impl.FeedbackMessage",
+        }
+        if name in own:
+            path += f".{own[name]}"
+        for service, service_class in implementation.items():
+            if name.name.startswith(service.name.name):
+                path += f".Impl.{service_class}{_ros_part(name, service)}"
+    return f"{interface.name.package}.{interface.name.namespace}:{path}"
+
+
+def _ros_part(name: TypeName, service: Service) -> str:
+    part = name.name.removeprefix(service.name.name).removeprefix("_")
+    return f".{part}" if part else ""

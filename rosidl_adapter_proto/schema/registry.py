@@ -6,17 +6,12 @@ same version of a type, its protobuf class is the same one.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import RLock
-from typing import Any, NamedTuple
 
-from google.protobuf import descriptor_pool, reflection
-from google.protobuf.descriptor import Descriptor, FileDescriptor
-from google.protobuf.descriptor_pool import DescriptorPool
-from google.protobuf.message import Message as ProtobufMessage
+from google.protobuf.descriptor import Descriptor
 
 from rosidl_adapter_proto.errors import DefinitionError, SchemaError
 from rosidl_adapter_proto.interfaces.catalog import Catalog
@@ -26,10 +21,8 @@ from rosidl_adapter_proto.interfaces.find import Source, folder_source, installe
 from rosidl_adapter_proto.interfaces.model import ScalarValue, TypeName, parts
 from rosidl_adapter_proto.schema.descriptor import file_descriptor
 from rosidl_adapter_proto.schema.numbering import HashNumbering, Numbering, SequentialNumbering
+from rosidl_adapter_proto.schema.pools import File, MessageClass, load, message_class
 from rosidl_adapter_proto.schema.proto import ProtoFile, ProtoMessage, check_names, proto_file
-from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
-
-MessageClass = type[ProtobufMessage]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +147,8 @@ class TypeRegistry:
         self._catalog = Catalog(tuple(installed_sources())) if catalog is None else catalog
         self._numbering = _numbering(lock_file)
         self._events = events
-        self._files: dict[TypeName, _File] = {}
+        self._lock = RLock()
+        self._files: dict[TypeName, File] = {}
         self._schemas: dict[TypeName, Schema] = {}
 
     @classmethod
@@ -222,19 +216,20 @@ class TypeRegistry:
             SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it.
         """
         type_name = name if isinstance(name, TypeName) else _parsed(name)
-        with _lock:
+        with self._lock:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._schema(type_name)
             return self._schemas[type_name]
 
     def _schema(self, name: TypeName) -> Schema:
         owner = self._catalog.definition_name(name)
-        descriptor = self._descriptor(owner)
-        file = self._files[owner].proto
+        files = self._with_imports(owner)
+        file = files[-1].proto
         message = next((each for each in file.messages if each.type_name == name), None)
         group = parts(file.source).get(name, {})
         if message is None and not group:
             raise DefinitionError(f"{name} is the event of a service: it needs a registry with events=True")
+        descriptor = load(files)
         description = self._catalog.describe(name)
         return Schema(
             str(name),
@@ -243,121 +238,21 @@ class TypeRegistry:
             file,
             message,
             {part: self[part_name] for part, part_name in group.items()},
-            _message_class(descriptor.message_types_by_name[name.name], owner) if message else None,
+            message_class(descriptor.message_types_by_name[name.name], owner) if message else None,
         )
 
-    def _descriptor(self, name: TypeName) -> FileDescriptor:
-        """Return the file of an interface in a pool that has everything it refers to in the same version."""
+    def _with_imports(self, name: TypeName) -> list[File]:
+        """Return the file of an interface behind those that it imports."""
         names = type_closure(self._catalog, name, events=self._events)
-        for each in names:
-            if each not in self._files:
-                self._files[each] = self._file(each)
-                _import_generated_code(each)
-        check_names(each.proto for each in self._files.values())
-        try:
-            return _loaded([self._files[each] for each in names])
-        except _RefusedError as error:
-            raise SchemaError(f"{name}: protobuf does not take what it becomes: {error}") from None
+        new = {each: self._file(each) for each in names if each not in self._files}
+        check_names(each.proto for each in (*self._files.values(), *new.values()))
+        self._files.update(new)
+        return [self._files[each] for each in names]
 
-    def _file(self, name: TypeName) -> _File:
+    def _file(self, name: TypeName) -> File:
         interface = self._catalog.definition(name).interface
         proto = proto_file(interface, self._numbering, self._catalog.definition_name, events=self._events)
-        return _File(name, proto, file_descriptor(proto).SerializeToString(deterministic=True))
-
-
-class _File(NamedTuple):
-    """The `.proto` file of an interface, and its descriptor."""
-
-    name: TypeName
-    proto: ProtoFile
-    serialized: bytes
-
-
-class _RefusedError(Exception):
-    """A descriptor pool has another version of a file or message, or does not take it at all."""
-
-
-_lock = RLock()
-"""Held by any registry that makes a type: descriptor pools are shared by all of them."""
-
-_other_pools: list[DescriptorPool] = []
-"""Pools for versions of types that the default pool cannot have since it has others."""
-
-_kept_classes: set[MessageClass] = set()
-"""Every class that was made: releases of protobuf before 4.22 crash where that of a nested message is gone."""
-
-
-def _loaded(files: list[_File]) -> FileDescriptor:
-    """Return the last of some files in the first pool that can have them all, and make the classes of all messages.
-
-    Raises:
-        _RefusedError: Not even a new pool takes them.
-    """
-    for pool in (descriptor_pool.Default(), *_other_pools):
-        try:
-            return _loaded_in(pool, files)
-        except _RefusedError:
-            continue
-    pool = DescriptorPool()
-    descriptor = _loaded_in(pool, files)
-    _other_pools.append(pool)
-    return descriptor
-
-
-def _loaded_in(pool: DescriptorPool, files: list[_File]) -> FileDescriptor:
-    found = [_find(pool, each.proto.path) for each in files]
-    for file, descriptor in zip(files, found, strict=True):
-        if descriptor is not None and descriptor.serialized_pb != file.serialized:
-            raise _RefusedError(f"there is another version of {file.proto.path}")
-    descriptors = [each or _added(pool, file) for file, each in zip(files, found, strict=True)]
-    for file, descriptor in zip(files, descriptors, strict=True):
-        messages = descriptor.message_types_by_name.values()
-        _kept_classes.update(_message_class(each, file.name) for each in messages)
-    return descriptors[-1]
-
-
-def _find(pool: DescriptorPool, path: str) -> FileDescriptor | None:
-    try:
-        return pool.FindFileByName(path)
-    except KeyError:
-        return None
-
-
-def _added(pool: DescriptorPool, file: _File) -> FileDescriptor:
-    try:
-        pool.AddSerializedFile(file.serialized)
-    except TypeError as error:
-        raise _RefusedError(str(error)) from None
-    return pool.FindFileByName(file.proto.path)
-
-
-def _generated_module(name: TypeName) -> str:
-    """Return the module that generated code has the protobuf classes of an interface in."""
-    return f"{DEFAULT_PYTHON_ROOT}.{name.package}.{name.namespace}.{name.name}_pb2"
-
-
-def _import_generated_code(name: TypeName) -> None:
-    """Import generated code of an interface, if there is any.
-
-    The default pool holds one version of a file: if another came first, generated code could not be imported any more.
-    """
-    module = _generated_module(name)
-    try:
-        importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        if not f"{module}.".startswith(f"{error.name}."):  # what is missing is something that it needs
-            raise
-
-
-def _message_class(descriptor: Descriptor, owner: TypeName) -> MessageClass:
-    """Return the class of a message, which is the one that there is if generated code has made it already.
-
-    Else it gets the module that generated code would give it: if that comes later, it takes this class.
-    """
-    contents = {"DESCRIPTOR": descriptor, "__module__": _generated_module(owner)}
-    metaclass: Any = reflection.GeneratedProtocolMessageType
-    message_class: MessageClass = metaclass(descriptor.name, (ProtobufMessage,), contents)
-    return message_class
+        return File(proto, file_descriptor(proto).SerializeToString(deterministic=True))
 
 
 def _numbering(lock_file: Path | None) -> Numbering:

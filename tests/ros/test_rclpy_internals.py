@@ -30,9 +30,9 @@ import rclpy.subscription
 import rclpy.task
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.serialization import serialize_message
-from std_msgs.msg import String
-from std_srvs.srv import SetBool
-from test_msgs.action import Fibonacci
+from std_msgs.msg import String  # type: ignore[import-untyped]
+from std_srvs.srv import SetBool  # type: ignore[import-untyped]
+from test_msgs.action import Fibonacci  # type: ignore[import-untyped]
 
 ROS = ROOT / "rosidl_adapter_proto" / "ros"
 NOT_ASSUMPTIONS = ("test_each_line_has_a_test", "test_no_other_module_touches_private_parts")
@@ -178,9 +178,10 @@ def test_callbacks_are_known_by_their_signature(native_node: Any) -> None:
         received.put(arguments)
 
     publisher = native_node.create_publisher(String, "signatures", 10)
+    both: tuple[Any, Any] = (wrapper, coroutine)
     for wrapped, length in ((lambda message: None, 1), (lambda message, info: None, 2)):
-        for callback in (wrapper, coroutine):
-            callback.__wrapped__ = wrapped  # type: ignore[attr-defined]
+        for callback in both:
+            callback.__wrapped__ = wrapped
             subscription = native_node.create_subscription(String, "signatures", callback, 10)
             connected(publisher).publish(String())
             assert len(received.get(timeout=SECONDS)) == length
@@ -220,7 +221,12 @@ def test_service_callback_is_an_attribute(native_node: Any) -> None:
     service, client = served(native_node, "attribute", echo)
     assert vars(service)["callback"] is echo
     asked: queue.Queue[Any] = queue.Queue()
-    marked(service, callback=property(lambda self: lambda *request: asked.put(request) or echo(*request)))
+
+    def answer(request: Any, response: Any) -> Any:
+        asked.put((request, response))
+        return echo(request, response)
+
+    marked(service, callback=property(lambda self: answer))
     assert client.call(SetBool.Request(data=True), SECONDS).success
     request, response = asked.get(timeout=SECONDS)
     assert (type(request), response) == (SetBool.Request, SetBool.Response(success=True))
@@ -238,7 +244,7 @@ def test_services_send_what_the_callback_returns(native_node: Any) -> None:
 
 
 def test_clients_call_through_call_async(entities: dict[type, Any]) -> None:
-    done = rclpy.task.Future()
+    done: Any = rclpy.task.Future()
     done.set_result("the response")
     client = marked(entities[rclpy.client.Client], call_async=lambda self, request: done)
     assert client.call(SetBool.Request(), SECONDS) == "the response"
@@ -288,9 +294,9 @@ def acting(native_node: Any) -> Iterator[Callable[..., tuple[Any, Any]]]:
 
     def make(name: str, execute: Any, **options: Any) -> tuple[Any, Any]:
         group = ReentrantCallbackGroup()
-        server_class = options.pop("server_class", rclpy.action.ActionServer)
+        server_class = options.pop("server_class", rclpy.action.server.ActionServer)
         server = server_class(native_node, Fibonacci, name, execute, callback_group=group, **options)
-        client = rclpy.action.ActionClient(native_node, Fibonacci, name, callback_group=group)
+        client: Any = rclpy.action.client.ActionClient(native_node, Fibonacci, name, callback_group=group)
         made.extend((server, client))
         assert client.wait_for_server(SECONDS)
         return server, client
@@ -311,21 +317,23 @@ def test_action_servers_register_their_callbacks(acting: Any) -> None:
     def recorder(name: str) -> Callable[[Any, Any], None]:
         def register(self: Any, callback: Any) -> None:
             registered[name] = callback
-            getattr(rclpy.action.ActionServer, name)(self, callback)
+            getattr(rclpy.action.server.ActionServer, name)(self, callback)
 
         return register
 
     names = [f"register_{what}_callback" for what in ("goal", "handle_accepted", "cancel", "execute")]
-    recording = type("Recording", (rclpy.action.ActionServer,), {name: recorder(name) for name in names})
+    recording = type(
+        "Recording", (rclpy.action.server.ActionServer,), {name: recorder(name) for name in names}
+    )
     acting("registered", succeed, server_class=recording, goal_callback=max)
-    actions = rclpy.action.server
+    actions: Any = rclpy.action.server
     assert registered == {
         "register_goal_callback": max,
         "register_handle_accepted_callback": actions.default_handle_accepted_callback,
         "register_cancel_callback": actions.default_cancel_callback,
         "register_execute_callback": succeed,
     }
-    assert actions.default_goal_callback(None) is rclpy.action.GoalResponse.ACCEPT
+    assert actions.default_goal_callback(None) is actions.GoalResponse.ACCEPT
 
 
 def test_goal_handles_may_change_their_class(acting: Any) -> None:
@@ -350,7 +358,7 @@ def test_goal_handles_may_change_their_class(acting: Any) -> None:
 def test_goal_handles_execute_through_their_server(acting: Any) -> None:
     notified: list[Any] = []
 
-    class Recording(rclpy.action.ActionServer):  # type: ignore[type-arg]
+    class Recording(rclpy.action.server.ActionServer):  # type: ignore[type-arg]
         def notify_execute(self, goal_handle: Any, execute_callback: Any) -> None:
             notified.append(execute_callback)
             super().notify_execute(goal_handle, execute_callback)

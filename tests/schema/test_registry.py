@@ -237,6 +237,7 @@ def test_two_interfaces_that_define_the_same_name(tmp_path: Path) -> None:
     registry = TypeRegistry.from_folders(package)
     with pytest.raises(SchemaError, match=r"^registry_twice\.srv\.pb\.Do_Request is defined by both "):
         registry["registry_twice/srv/Do"]
+    assert registry["std_msgs/msg/String"].message_class is not None  # others are not affected
 
 
 # Numbers
