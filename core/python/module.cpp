@@ -5,10 +5,9 @@
 
 #include <cstring>
 #include <deque>
+#include <rosidl_adapter_proto/packed_fields.hpp>
 #include <string>
 #include <vector>
-
-#include <rosidl_adapter_proto/packed_fields.hpp>
 
 #include "batch.hpp"
 
@@ -70,7 +69,8 @@ void add_ranges(Input buffer, const Buffer& ranges, Add add) {
     throw nb::type_error("`ranges` must be a contiguous buffer of 64-bit numbers, such as array('Q')");
   const auto* const places = static_cast<const uint8_t*>(view.buf);
   if (view.len % sizeof(Range) != 0)
-    throw nb::value_error("`ranges` has an odd number of places; give each message its first byte and the one after its last");
+    throw nb::value_error(
+        "`ranges` has an odd number of places; give each message its first byte and the one after its last");
   for (Py_ssize_t at = 0; at < view.len; at += sizeof(Range)) {
     Range range;
     std::memcpy(&range, places + at, sizeof range);
@@ -160,7 +160,8 @@ class Transcoder {
       const Buffer buffer(result, PyBUF_WRITABLE);
       const Output output = buffer.output();
       for (size_t i = 0; i < batch.size(); ++i) {
-        if (overlap(batch[i], output)) throw nb::value_error("`into` is memory of the messages; give other memory");
+        if (overlap(batch[i], output))
+          throw nb::value_error("`into` is memory of the messages; give other memory");
       }
       {
         nb::gil_scoped_release release;
@@ -208,8 +209,8 @@ class Transcoder {
   uint64_t size_limit_;
 };
 
-// The two directions from and to message objects. Python would do it in two lines, at twice the cost for small
-// messages.
+// The two directions from and to message objects. Python would do it in two lines, at twice the cost for
+// small messages.
 class Codec {
  public:
   Codec(nb::handle_t<Transcoder> transcoder, nb::object message_class)
