@@ -9,7 +9,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 FUZZ_MUTATIONS ?= 200000
 FUZZ_SECONDS ?= 600
 
-.PHONY: demo test check test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
+.PHONY: demo test check tidy test-core test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
 
 # What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
 KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
@@ -40,12 +40,21 @@ $(COLCON)/ready: pyproject.toml tests/hooks/relocate_ros_wheels.py
 demo: $(VENV)/ready
 	$(BIN)/python examples/demo.py
 
-test: check test-kilted test-jazzy test-colcon test-fuzz
+test: check test-core test-kilted test-jazzy test-colcon test-fuzz
+
+CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/python/*.cpp core/test/*.?pp core/fuzz/*.cpp)
 
 check: $(VENV)/ready
-	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks
+	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks core
+	$(BIN)/clang-format --dry-run --Werror $(CPP_FILES)
 	$(BIN)/ruff check --quiet .
 	$(BIN)/mypy
+
+# Slower than compiling, so not part of the tests.
+tidy: $(VENV)/ready
+	$(BIN)/cmake -S . -B build/core -DROSIDL_PROTO_TEST=ON -DROSIDL_PROTO_PYTHON=OFF \
+	  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
+	$(BIN)/clang-tidy -p build/core --quiet core/src/*.cpp core/test/*.cpp
 
 test-kilted: $(VENV)/ready
 	$(BIN)/python -m pytest
@@ -57,6 +66,12 @@ test-jazzy: $(JAZZY)/ready
 test-colcon: $(COLCON)/ready
 	$(COLCON)/bin/pip install --quiet --no-deps .
 	$(COLCON)/bin/python -m pytest tests/hooks/test_colcon.py
+
+# The native core without Python.
+test-core: $(VENV)/ready
+	$(BIN)/cmake -S . -B build/core -DROSIDL_PROTO_TEST=ON -DROSIDL_PROTO_PYTHON=OFF
+	$(BIN)/cmake --build build/core
+	$(BIN)/ctest --test-dir build/core --output-on-failure
 
 # A bounded number of mutated messages through the native core, with sanitizers; any compiler will do.
 test-fuzz: $(VENV)/ready
@@ -80,10 +95,12 @@ benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/messages.py
 
 golden: $(VENV)/ready
-	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py --update-golden
+	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py \
+	  tests/transcode/test_plan_golden.py --update-golden
 
 format: $(VENV)/ready
-	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks
+	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks core
+	$(BIN)/clang-format -i $(CPP_FILES)
 	$(BIN)/ruff check --fix .
 
 clean:

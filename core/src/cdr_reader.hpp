@@ -19,7 +19,7 @@ class CdrReader {
   };
 
  public:
-  CdrReader(const Plan& plan, Input cdr, Sink& sink, Error& error)
+  CdrReader(const Plan& plan, Input cdr, const Sink& sink, Error& error)
       : plan_(plan), input_(cdr, error), sink_(sink), error_(error) {}
 
   // Reads the whole message; `*at` is where the sink begins, and then where it ended.
@@ -90,26 +90,32 @@ class CdrReader {
     });
   }
 
-  Cursor many(const Operation& op, Cursor c) {
+  ROSIDL_PROTO_INLINE Cursor many(const Operation& op, Cursor c) {
     return visit(op.cdr, [&](auto form) ROSIDL_PROTO_INLINE_LAMBDA -> Cursor {
       using F = decltype(form);
       if constexpr (F::kIsNumber) {
         return numbers<F>(op, c);
       } else {
-        uint32_t count;
-        const uint8_t* const p = input_.elements(op, c.in, minimum_size<F>(op), &count);
-        if (p == nullptr) return failed();
-        c = take(p, sink_.elements(op, c.at, count), p);
-        if (c.in == nullptr) return c;
-        return each(count, c, [&](Cursor next, int64_t element) {
-          if constexpr (F::kIsString) {
-            return string<F>(op, next, element);
-          } else {
-            return submessage(op, next, element);
-          }
-        });
+        return elements<F>(op, c);
       }
     });
+  }
+
+  template <class F>
+  ROSIDL_PROTO_NO_INLINE Cursor elements(const Operation& op, Cursor c) {
+    uint32_t count;
+    const uint8_t* const p = input_.elements(op, c.in, minimum_size<F>(op), &count);
+    if (p == nullptr) return failed();
+    c = take(p, sink_.elements(op, c.at, count), p);
+    for (uint32_t i = 0; c.in != nullptr && i < count; ++i) {
+      if constexpr (F::kIsString) {
+        c = string<F>(op, c, i);
+      } else {
+        c = submessage(op, c, i);
+      }
+      if (c.in == nullptr) error_.element = i;
+    }
+    return c;
   }
 
   // Finds the end of a field without looking at more than that takes.
@@ -159,18 +165,6 @@ class CdrReader {
     }
   }
 
-  template <class Element>
-  Cursor each(uint32_t count, Cursor c, Element element) {
-    for (uint32_t i = 0; i < count; ++i) {
-      c = element(c, int64_t{i});
-      if (c.in == nullptr) {
-        error_.element = i;
-        return c;
-      }
-    }
-    return c;
-  }
-
   template <class F>
   uint64_t minimum_size(const Operation& op) const {
     if constexpr (F::kIsString) {
@@ -189,7 +183,7 @@ class CdrReader {
 
   // Finds the numbers of an array or sequence.
   template <uint64_t kSize>
-  Found find_numbers(const Operation& op, const uint8_t* p, uint32_t* count) {
+  ROSIDL_PROTO_INLINE Found find_numbers(const Operation& op, const uint8_t* p, uint32_t* count) {
     if ((p = input_.elements(op, p, kSize, count)) == nullptr) return {};
     if (*count == 0) {
       if (kSize >= 4) slack_ += kSize;
@@ -201,7 +195,7 @@ class CdrReader {
   }
 
   template <class F>
-  Cursor numbers(const Operation& op, Cursor c) {
+  ROSIDL_PROTO_NO_INLINE Cursor numbers(const Operation& op, Cursor c) {
     uint32_t count;
     const Found found = find_numbers<F::kSize>(op, c.in, &count);
     if (found.after == nullptr) return failed();
@@ -317,7 +311,7 @@ class CdrReader {
 
   const Plan& plan_;
   CdrInput<kSwap> input_;
-  Sink& sink_;
+  Sink sink_;
   Error& error_;
   uint64_t slack_ = 0;
 };

@@ -11,7 +11,7 @@ namespace {
 class CdrSize : public Stop {
  public:
   using At = uint64_t;
-  static constexpr bool kSizesOnly = true, kPlaces = false;
+  static constexpr bool kSizesOnly = true, kPlaces = false, kAllFields = true;
 
   struct Nested {
     At at;
@@ -34,8 +34,9 @@ class CdrSize : public Stop {
     return within_limit(at);
   }
 
-  At elements(const Operation& op, At at, uint64_t) {
-    return op.shape == Shape::Sequence ? align(at, 4) + 4 : at;
+  At elements(const Operation& op, At at, uint64_t count) {
+    if (op.shape == Shape::Sequence) at = align(at, 4) + 4;
+    return count == 0 ? within_limit(at) : at;  // else an element that does not fit is named
   }
 
   At string(const Operation&, At at, int64_t, Text text) {
@@ -75,7 +76,7 @@ class CdrSize : public Stop {
 class CdrWriter : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = true;
+  static constexpr bool kSizesOnly = false, kPlaces = true, kAllFields = true;
 
   struct Nested {
     At at;

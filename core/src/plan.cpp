@@ -11,7 +11,7 @@
 namespace rosidl_proto {
 namespace {
 
-constexpr char kMark[] = {'R', 'P', 'P', '2'};  // the last character is the version
+constexpr char kMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
 constexpr size_t kHeaderBytes = 20, kMessageBytes = 24, kOperationBytes = 40;
 constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 

@@ -149,7 +149,7 @@ class ProtobufReader {
   using Slot = Fields::Slot;
 
  public:
-  ProtobufReader(const Plan& plan, Input proto, Sink& sink, Error& error)
+  ProtobufReader(const Plan& plan, Input proto, const Sink& sink, Error& error)
       : plan_(plan), input_(plan, proto, error), sink_(sink) {}
 
   // Reads the whole message, whose fields `slots` may already have.
@@ -159,7 +159,7 @@ class ProtobufReader {
         indexed ? fields(root, input_.whole(), slots, *at) : message(root, input_.whole(), slots, *at);
     if (Sink::failed(end)) return false;
     *at = end;
-    return sink_.finish(end) || input_.fail(sink_.reason, input_.whole().end, sink_.detail);
+    return sink_.finish(end) || input_.fail(sink_.reason, nullptr, sink_.detail);
   }
 
  private:
@@ -196,6 +196,7 @@ class ProtobufReader {
     const Operation* const last = plan_.end(message);
     Slot* const free = slots + message.count;
     for (const Operation* op = plan_.begin(message); op != last; ++op) {
+      if (!Sink::kAllFields && op->reading == Reading::Skip) continue;
       const ProtobufField field{message, *op, slots[op - plan_.begin(message)], range.end};
       at = op->shape == Shape::Single ? one(field, free, at) : many(field, free, at);
       if (Sink::failed(at)) return input_.leave(*op), at;
@@ -203,7 +204,7 @@ class ProtobufReader {
     return at;
   }
 
-  At one(const ProtobufField& field, Slot* free, At at) {
+  ROSIDL_PROTO_INLINE At one(const ProtobufField& field, Slot* free, At at) {
     const Slot& slot = field.slot;
     return visit(field.op.cdr, [&](auto form) ROSIDL_PROTO_INLINE_LAMBDA -> At {
       using F = decltype(form);
@@ -231,7 +232,7 @@ class ProtobufReader {
     });
   }
 
-  At many(const ProtobufField& field, Slot* free, At at) {
+  ROSIDL_PROTO_INLINE At many(const ProtobufField& field, Slot* free, At at) {
     return visit(field.op.cdr, [&](auto form) ROSIDL_PROTO_INLINE_LAMBDA -> At {
       using F = decltype(form);
       if constexpr (F::kIsNumber) {
@@ -243,7 +244,7 @@ class ProtobufReader {
   }
 
   template <class F>
-  At numbers(const ProtobufField& field, At at) {
+  ROSIDL_PROTO_NO_INLINE At numbers(const ProtobufField& field, At at) {
     const Slot& slot = field.slot;
     uint64_t found = slot.elements;
     if constexpr (F::kIsOneValue) {
@@ -258,34 +259,41 @@ class ProtobufReader {
   }
 
   template <class F>
-  At elements(const ProtobufField& field, Slot* free, At at) {
+  ROSIDL_PROTO_NO_INLINE At elements(const ProtobufField& field, Slot* free, At at) {
     const uint32_t found = field.slot.occurrences;
     if (!check_count(field, found)) return failed();
     const bool absent = found == 0 && field.op.shape == Shape::Array;
     const uint32_t count = absent ? field.op.count : found;
     at = take(sink_.elements(field.op, at, count));
     if (Sink::failed(at)) return at;
-    const auto element = [&](Range range, int64_t index) {
-      if constexpr (F::kIsString) {
-        at = string<F>(field.op, at, index, {range.begin, ProtobufInput::left(range.begin, range.end)});
-      } else {
-        at = submessage(field.op, range, free, at, index);
+    if constexpr (F::kIsString) {
+      return each(field, absent, at, [&](Range range, At next, int64_t index) {
+        return string<F>(field.op, next, index, {range.begin, ProtobufInput::left(range.begin, range.end)});
+      });
+    } else {
+      const ProtobufInput::Anchor anchor(input_, field.slot);
+      if constexpr (Sink::kSizesOnly) {
+        const Message& part = plan_.message(field.op.message);
+        if (absent || part.fixed) return take(sink_.within_limit(sink_.defaults(part, at, count)));
       }
-      return !Sink::failed(at);
-    };
-    const ProtobufInput::Anchor anchor(input_, field.slot);
-    if constexpr (Sink::kSizesOnly && !F::kIsString) {
-      const Message& part = plan_.message(field.op.message);
-      if (absent || part.fixed) return take(sink_.within_limit(sink_.defaults(part, at, count)));
+      return each(field, absent, at, [&](Range range, At next, int64_t index) {
+        return submessage(field.op, range, free, next, index);
+      });
     }
+  }
+
+  // Calls `element(bytes, at, index)` for each occurrence of a field, or for an array that is absent.
+  template <class Element>
+  At each(const ProtobufField& field, bool absent, At at, Element element) {
     if (absent) {
-      for (uint32_t i = 0; i < count; ++i) {
-        if (!element(input_.nothing(), i)) return at;
+      for (uint32_t i = 0; i < field.op.count && !Sink::failed(at); ++i) {
+        at = element(input_.nothing(), at, i);
       }
       return at;
     }
     const auto occurrence = [&](const uint8_t* data, uint64_t size, bool, uint32_t index) {
-      return element({data, data + size}, index);
+      at = element(Range{data, data + size}, at, index);
+      return !Sink::failed(at);
     };
     return input_.occurrences(field.message, field.op, field.slot, field.end, occurrence) ? at : failed();
   }
@@ -419,7 +427,7 @@ class ProtobufReader {
 
   const Plan& plan_;
   ProtobufInput input_;
-  Sink& sink_;
+  Sink sink_;
 };
 
 }  // namespace

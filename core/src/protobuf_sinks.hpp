@@ -40,7 +40,7 @@ constexpr uint64_t kElementSize = F::kCopiesToProtobuf                ? F::kSize
 class ProtobufSize : public Stop {
  public:
   using At = uint64_t;
-  static constexpr bool kSizesOnly = false, kPlaces = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
 
   struct Nested {
     At at;
@@ -127,7 +127,7 @@ class ProtobufSize : public Stop {
 class ProtobufWriter : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
 
   struct Nested {
     At at;

@@ -7,6 +7,7 @@
 //   failure()                 such a place, for a reader that found something wrong
 //   kSizesOnly                it wants to know how large things are and not what numbers are
 //   kPlaces                   it can write the fields of a message of fixed size in any order (`CdrWriter`)
+//   kAllFields                it needs fields that protobuf does not have, too: zeros
 //   number<F>(op, at, raw)    one number of the form F, as its bits in CDR
 //   numbers<F>(op, at, numbers)  an array or sequence of them: `count()`, `bytes()` (their bytes if those are
 //   the same

@@ -8,18 +8,13 @@ from typing import TYPE_CHECKING, Any, Generic, overload
 import rclpy.action.client
 import rclpy.action.server
 import rclpy.node
+from rclpy.action.server import CancelResponse, GoalResponse
 
 from rosidl_adapter_proto.adapter import ActionAdapter, FeedbackT, GoalT, ResultT
-from rosidl_adapter_proto.ros.adapters import find_adapter
-from rosidl_adapter_proto.ros.conversion import (
-    OnConversionError,
-    Reception,
-    convert_in,
-    imitate,
-    to_ros_message,
-)
-from rosidl_adapter_proto.ros.entities import convert_result
-from rosidl_adapter_proto.ros.type_hash import check_type_hash
+from rosidl_adapter_proto.ros.adapters import ACTION, RosAction, RosMessage, resolve
+from rosidl_adapter_proto.ros.inbound import OnConversionError, Reception, converting_callback
+from rosidl_adapter_proto.ros.outbound import to_ros_message
+from rosidl_adapter_proto.ros.rclpy_internals import ConvertingActionClient, convert_in
 
 if TYPE_CHECKING:
     import rclpy.task
@@ -29,30 +24,44 @@ if TYPE_CHECKING:
 
 
 class ServerGoalHandle(rclpy.action.server.ServerGoalHandle, Generic[GoalT, ResultT, FeedbackT]):
-    """The server's handle of a goal, with protobuf messages."""
+    """The server's handle of a goal, with protobuf messages.
 
+    Attributes:
+        adapter: Converts the messages.
+    """
+
+    adapter: type[ActionAdapter[GoalT, ResultT, FeedbackT]]
     _custom_request: GoalT | None = None
 
     @property
     def request(self) -> GoalT:
         """The goal."""
         if self._custom_request is None:
-            self._custom_request = self._adapter.goal.convert_to_custom(super().request)
+            self._custom_request = self.adapter.goal.convert_to_custom(super().request)
         return self._custom_request
 
-    def publish_feedback(self, feedback: FeedbackT | Any) -> None:
+    def publish_feedback(self, feedback: FeedbackT | RosMessage) -> None:  # type: ignore[override]  # rclpy errs
         """Send feedback to the clients of the goal.
 
         Raises:
             ConversionError: A value does not fit the ROS type; nothing is sent.
             TypeError: It is neither a protobuf message nor a ROS message of this action.
         """
-        super().publish_feedback(to_ros_message(self._adapter.feedback, feedback, "publish_feedback"))
+        super().publish_feedback(to_ros_message(self.adapter.feedback, feedback, "publish_feedback"))
 
-    @property
-    def _adapter(self) -> type[ActionAdapter[GoalT, ResultT, FeedbackT]]:
-        adapter: type[ActionAdapter[GoalT, ResultT, FeedbackT]] = self._action_server.adapter  # type: ignore[attr-defined]
-        return adapter
+
+if TYPE_CHECKING:
+    ExecuteCallback = Callable[
+        [ServerGoalHandle[GoalT, ResultT, FeedbackT]],
+        ResultT | RosMessage | Coroutine[Any, Any, ResultT | RosMessage],
+    ]
+    """Takes the handle of a goal and returns the result; or is a coroutine function that does."""
+
+    GoalCallback = Callable[[GoalT], GoalResponse | Coroutine[Any, Any, GoalResponse]]
+    HandleAcceptedCallback = Callable[[ServerGoalHandle[GoalT, ResultT, FeedbackT]], object]
+    CancelCallback = Callable[
+        [ServerGoalHandle[GoalT, ResultT, FeedbackT]], CancelResponse | Coroutine[Any, Any, CancelResponse]
+    ]
 
 
 class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, FeedbackT]):
@@ -65,17 +74,19 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
     """
 
     adapter: type[ActionAdapter[GoalT, ResultT, FeedbackT]] | None
+    _reception: Reception[GoalT]
 
     @overload
     def __init__(
         self,
         node: rclpy.node.Node,
-        action_type: type[ActionAdapter[GoalT, ResultT, FeedbackT]],
+        action_type: type[ActionAdapter[GoalT, ResultT, FeedbackT]] | type[GoalT],
         action_name: str,
-        execute_callback: Callable[
-            [ServerGoalHandle[GoalT, ResultT, FeedbackT]], ResultT | Coroutine[Any, Any, ResultT]
-        ],
+        execute_callback: ExecuteCallback[GoalT, ResultT, FeedbackT],
         *,
+        goal_callback: GoalCallback[GoalT] = ...,
+        handle_accepted_callback: HandleAcceptedCallback[GoalT, ResultT, FeedbackT] = ...,
+        cancel_callback: CancelCallback[GoalT, ResultT, FeedbackT] = ...,
         on_conversion_error: OnConversionError | None = None,
         **options: Any,
     ) -> None: ...
@@ -84,11 +95,9 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
     def __init__(
         self: ActionServer[Any, Any, Any],
         node: rclpy.node.Node,
-        action_type: type[Any],
+        action_type: type[RosAction],
         action_name: str,
         execute_callback: Callable[[Any], Any],
-        *,
-        on_conversion_error: OnConversionError | None = None,
         **options: Any,
     ) -> None: ...
 
@@ -118,15 +127,12 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
             RosNotFoundError: The ROS action class cannot be imported.
             TypeHashError: The adapter was generated for another version of the type than the installed one.
         """
-        self.adapter = find_adapter(ActionAdapter, action_type)
+        ros_type, self.adapter = resolve(ACTION, action_type, node.get_logger())
         if self.adapter is not None:
-            action_type = self.adapter.ros_action_type
-            check_type_hash(self.adapter, action_type, node.get_logger())
+            convert = self.adapter.goal.convert_to_custom
             source = f"a client of action {action_name}"
-            self._reception: Reception[GoalT] = Reception(
-                node, source, self.adapter.goal.convert_to_custom, on_conversion_error
-            )
-        super().__init__(node, action_type, action_name, execute_callback, **options)
+            self._reception = Reception(node.get_logger(), source, convert, on_conversion_error)
+        super().__init__(node, ros_type, action_name, execute_callback, **options)
 
     @property
     def conversion_errors(self) -> int:
@@ -136,7 +142,9 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
     def register_goal_callback(self, goal_callback: Callable[[Any], Any] | None) -> None:
         """Set what decides on goals, as `rclpy.action.ActionServer.register_goal_callback` does."""
         if self.adapter:
-            goal_callback = self._goal_callback_of_rclpy(goal_callback)
+            goal_callback = self._goal_callback_of_rclpy(
+                goal_callback or rclpy.action.server.default_goal_callback
+            )
         super().register_goal_callback(goal_callback)
 
     def register_handle_accepted_callback(self, handle_accepted_callback: Callable[..., Any] | None) -> None:
@@ -165,62 +173,35 @@ class ActionServer(rclpy.action.server.ActionServer, Generic[GoalT, ResultT, Fee
             execute_callback = self._execute_callback_of_rclpy(execute_callback)
         super().notify_execute(goal_handle, execute_callback)
 
-    def _goal_callback_of_rclpy(self, callback: Callable[[Any], Any] | None) -> Callable[..., Any]:
-        user_callback: Any = callback or rclpy.action.server.default_goal_callback
+    def _goal_callback_of_rclpy(self, callback: Callable[[Any], Any]) -> Callable[..., Any]:
+        def accept(ros_goal: Any) -> tuple[GoalT] | None:
+            goal = self._reception(ros_goal)
+            return None if goal is None else (goal,)
 
-        async def await_callback(goal: Any) -> Any:
-            custom_goal = self._reception(goal)
-            return (
-                rclpy.action.server.GoalResponse.REJECT
-                if custom_goal is None
-                else await user_callback(custom_goal)
-            )
-
-        def call_callback(goal: Any) -> Any:
-            custom_goal = self._reception(goal)
-            return (
-                rclpy.action.server.GoalResponse.REJECT if custom_goal is None else user_callback(custom_goal)
-            )
-
-        return imitate(user_callback, await_callback, call_callback)
+        return converting_callback(callback, accept, dropped=GoalResponse.REJECT)
 
     def _handle_callback_of_rclpy(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        async def await_callback(goal_handle: Any) -> Any:
-            return await callback(self._converting(goal_handle))
-
-        def call_callback(goal_handle: Any) -> Any:
-            return callback(self._converting(goal_handle))
-
-        return imitate(callback, await_callback, call_callback)
+        return converting_callback(callback, self._converting)
 
     def _execute_callback_of_rclpy(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        what = "the result of an execute callback"
+        def finish(result: Any) -> Any:
+            assert self.adapter is not None
+            return to_ros_message(self.adapter.result, result, "the result of an execute callback")
 
-        async def await_callback(goal_handle: Any) -> Any:
-            return self._ros_result(await callback(self._converting(goal_handle)), what)
+        return converting_callback(callback, self._converting, finish)
 
-        def call_callback(goal_handle: Any) -> Any:
-            return self._ros_result(callback(self._converting(goal_handle)), what)
-
-        return imitate(callback, await_callback, call_callback)
-
-    def _ros_result(self, result: Any, what: str) -> Any:
-        assert self.adapter is not None
-        return to_ros_message(self.adapter.result, result, what)
-
-    def _converting(self, goal_handle: Any) -> ServerGoalHandle[GoalT, ResultT, FeedbackT]:
-        """Return the goal handle, which rclpy made, with protobuf messages."""
+    def _converting(self, goal_handle: Any) -> tuple[ServerGoalHandle[GoalT, ResultT, FeedbackT]]:
+        """Return the goal handle, which rclpy made, with protobuf messages, as the argument of a callback."""
         if not isinstance(goal_handle, ServerGoalHandle):
-            convert_in(goal_handle, ServerGoalHandle)
-        handle: ServerGoalHandle[GoalT, ResultT, FeedbackT] = goal_handle
-        return handle
+            convert_in(goal_handle, ServerGoalHandle, adapter=self.adapter)
+        return (goal_handle,)
 
 
 ClientGoalHandle = rclpy.action.client.ClientGoalHandle
 """The client's handle of a goal is that of rclpy; what it returns has protobuf messages."""
 
 
-class ActionClient(rclpy.action.client.ActionClient, Generic[GoalT, ResultT, FeedbackT]):
+class ActionClient(ConvertingActionClient, Generic[GoalT, ResultT, FeedbackT]):
     """An action client with protobuf messages.
 
     Feedback that cannot be converted is dropped; a result that cannot is the ConversionError of its future.
@@ -230,6 +211,7 @@ class ActionClient(rclpy.action.client.ActionClient, Generic[GoalT, ResultT, Fee
     """
 
     adapter: type[ActionAdapter[GoalT, ResultT, FeedbackT]] | None
+    _reception: Reception[Any]
 
     @overload
     def __init__(
@@ -244,12 +226,21 @@ class ActionClient(rclpy.action.client.ActionClient, Generic[GoalT, ResultT, Fee
 
     @overload
     def __init__(
-        self: ActionClient[Any, Any, Any],
+        self: ActionClient[GoalT, Any, Any],
         node: rclpy.node.Node,
-        action_type: type[Any],
+        action_type: type[GoalT],
         action_name: str,
         *,
         on_conversion_error: OnConversionError | None = None,
+        **options: Any,
+    ) -> None: ...
+
+    @overload
+    def __init__(
+        self: ActionClient[Any, Any, Any],
+        node: rclpy.node.Node,
+        action_type: type[RosAction],
+        action_name: str,
         **options: Any,
     ) -> None: ...
 
@@ -277,22 +268,20 @@ class ActionClient(rclpy.action.client.ActionClient, Generic[GoalT, ResultT, Fee
             RosNotFoundError: The ROS action class cannot be imported.
             TypeHashError: The adapter was generated for another version of the type than the installed one.
         """
-        self.adapter = find_adapter(ActionAdapter, action_type)
+        ros_type, self.adapter = resolve(ACTION, action_type, node.get_logger())
         if self.adapter is not None:
-            action_type = self.adapter.ros_action_type
-            check_type_hash(self.adapter, action_type, node.get_logger())
+            convert = self.adapter.feedback_message.convert_to_custom
             source = f"the server of action {action_name}"
-            self._reception: Reception[Any] = Reception(
-                node, source, self.adapter.feedback_message.convert_to_custom, on_conversion_error
-            )
-        super().__init__(node, action_type, action_name, **options)
+            self._reception = Reception(node.get_logger(), source, convert, on_conversion_error)
+        self._sender = f"the client of action {action_name}"
+        super().__init__(node, ros_type, action_name, **options)
 
     @property
     def conversion_errors(self) -> int:
         """How many feedback messages were dropped, since they could not be converted."""
         return self._reception.conversion_errors if self.adapter else 0
 
-    def send_goal(self, goal: GoalT | Any, **options: Any) -> Any:
+    def send_goal(self, goal: GoalT | RosMessage, **options: Any) -> Any:
         """Send a goal and wait for its result, as `rclpy.action.ActionClient.send_goal` does.
 
         Returns:
@@ -306,7 +295,7 @@ class ActionClient(rclpy.action.client.ActionClient, Generic[GoalT, ResultT, Fee
 
     def send_goal_async(
         self,
-        goal: GoalT | Any,
+        goal: GoalT | RosMessage,
         feedback_callback: Callable[..., Any] | None = None,
         goal_uuid: Any = None,
     ) -> rclpy.task.Future[ClientGoalHandle[GoalT, ResultT, FeedbackT]]:
@@ -334,10 +323,4 @@ class ActionClient(rclpy.action.client.ActionClient, Generic[GoalT, ResultT, Fee
     def _ros_goal(self, goal: Any) -> Any:
         if self.adapter is None:
             return goal
-        return to_ros_message(self.adapter.goal, goal, f"the client of action {self._action_name}")
-
-    def _get_result_async(self, goal_handle: Any) -> rclpy.task.Future[Any]:
-        future: rclpy.task.Future[Any] = super()._get_result_async(goal_handle)
-        if self.adapter is not None:
-            convert_result(future, self.adapter.get_result.response)
-        return future
+        return to_ros_message(self.adapter.goal, goal, self._sender)

@@ -1,46 +1,121 @@
-"""Finds the adapter of what a user hands over: an adapter, a protobuf class, or a ROS type, which has none."""
+"""What a user gives to say which type is meant: an adapter, a protobuf class that has one, or a ROS type."""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from google.protobuf.message import Message
 
 from rosidl_adapter_proto.adapter import ActionAdapter, ServiceAdapter, TypeAdapter
 from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.ros.type_hash import check_type_hash
+from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
-DEFAULT_PYTHON_ROOT = "rosidl_proto"
-"""The namespace package of generated code, unless it was generated with another one."""
+if TYPE_CHECKING:
+    from rclpy.impl.rcutils_logger import RcutilsLogger
 
-CUSTOM_TYPE: dict[type, Callable[[Any], Any]] = {
-    TypeAdapter: lambda adapter: adapter.custom_type,
-    ServiceAdapter: lambda adapter: adapter.request.custom_type,
-    ActionAdapter: lambda adapter: adapter.goal.custom_type,
-}
-"""The protobuf class that stands for an adapter of each kind."""
 
-NAMES: dict[type, str] = {
-    TypeAdapter: "a message, such as StringAdapter or String",
-    ServiceAdapter: "a service, such as SetBoolAdapter or SetBool_Request",
-    ActionAdapter: "an action, such as FibonacciAdapter or Fibonacci_Goal",
-}
+class RosMessage(Protocol):
+    """A ROS message, for type checkers: what rosidl generates has this method, and a protobuf class does not."""
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        """Return the type of each field."""
+        ...
+
+
+class RosService(Protocol):
+    """A ROS service, for type checkers: what rosidl generates has these classes, and an adapter does not."""
+
+    Request: Any
+    Response: Any
+
+
+class RosAction(Protocol):
+    """A ROS action, for type checkers: what rosidl generates has these classes, and an adapter does not."""
+
+    Goal: Any
+    Result: Any
+    Feedback: Any
+
+
+class Kind(NamedTuple):
+    """A kind of type.
+
+    Attributes:
+        adapter: The base class of its adapters.
+        custom_type: Returns the protobuf class that stands for an adapter.
+        ros_type: Returns the ROS class that an adapter is for.
+        examples: What to give, for people.
+    """
+
+    adapter: type[Any]
+    custom_type: Callable[[Any], Any]
+    ros_type: Callable[[Any], Any]
+    examples: str
+
+
+MESSAGE = Kind(
+    TypeAdapter,
+    attrgetter("custom_type"),
+    attrgetter("ros_message_type"),
+    "a message, such as StringAdapter or String",
+)
+SERVICE = Kind(
+    ServiceAdapter,
+    attrgetter("request.custom_type"),
+    attrgetter("ros_service_type"),
+    "a service, such as SetBoolAdapter or SetBool_Request",
+)
+ACTION = Kind(
+    ActionAdapter,
+    attrgetter("goal.custom_type"),
+    attrgetter("ros_action_type"),
+    "an action, such as FibonacciAdapter or Fibonacci_Goal",
+)
+ANY_ADAPTER = tuple(kind.adapter for kind in (MESSAGE, SERVICE, ACTION))
 
 
 class AdapterNotFoundError(Error, TypeError):
     """A protobuf class has no adapter of the kind that is needed, or more than one."""
 
 
-_found: dict[tuple[type, type], Any] = {}
+def resolve(kind: Kind, given: object, logger: RcutilsLogger) -> tuple[Any, Any]:
+    """Return the ROS type that a user means, and the adapter of what is sent with it.
+
+    Args:
+        kind: What is needed.
+        given: An adapter, a protobuf class that has one, or anything else, such as a ROS type.
+        logger: Of the node, to warn of an adapter that cannot be checked.
+
+    Returns:
+        The ROS type and the adapter, or what was given and None if it has no adapter.
+
+    Raises:
+        AdapterNotFoundError: A protobuf class has no adapter, or an adapter is of another kind.
+        RosNotFoundError: The ROS class cannot be imported.
+        TypeHashError: The adapter was generated for another version of the type than the installed one.
+    """
+    adapter = find_adapter(kind, given)
+    if adapter is None:
+        return given, None
+    ros_type = kind.ros_type(adapter)
+    check_type_hash(adapter, ros_type, logger)
+    return ros_type, adapter
 
 
-def find_adapter(kind: type, given: object) -> Any:
+_found: dict[tuple[Kind, type], Any] = {}
+
+
+def find_adapter(kind: Kind, given: object) -> Any:
     """Return the adapter of what a user gave to create something with.
 
     Args:
-        kind: What is needed: `TypeAdapter`, `ServiceAdapter` or `ActionAdapter`.
+        kind: What is needed.
         given: An adapter or a protobuf class (of a service its request, of an action its goal), or anything else.
 
     Returns:
@@ -51,10 +126,10 @@ def find_adapter(kind: type, given: object) -> Any:
     """
     if not isinstance(given, type):
         return None
-    if issubclass(given, kind):
+    if issubclass(given, kind.adapter):
         return given
-    if issubclass(given, tuple(CUSTOM_TYPE)):
-        raise AdapterNotFoundError(f"{given.__name__} is not the adapter of {NAMES[kind]}")
+    if issubclass(given, ANY_ADAPTER):
+        raise AdapterNotFoundError(f"{given.__name__} is not the adapter of {kind.examples}")
     if not issubclass(given, Message):
         return None
     if (kind, given) not in _found:
@@ -62,16 +137,16 @@ def find_adapter(kind: type, given: object) -> Any:
     return _found[kind, given]
 
 
-def _search(kind: type, custom_type: type[Message]) -> Any:
+def _search(kind: Kind, custom_type: type[Message]) -> Any:
     for module in _adapter_modules(custom_type):
         for adapter in vars(module).values():
             if (
                 isinstance(adapter, type)
-                and issubclass(adapter, kind)
+                and issubclass(adapter, kind.adapter)
                 and _is_for(kind, adapter, custom_type)
             ):
                 return adapter
-    imported = [adapter for adapter in _subclasses(kind) if _is_for(kind, adapter, custom_type)]
+    imported = [adapter for adapter in _subclasses(kind.adapter) if _is_for(kind, adapter, custom_type)]
     if len(imported) == 1:
         return imported[0]
     name = f"{custom_type.__module__}.{custom_type.__qualname__}"
@@ -79,7 +154,7 @@ def _search(kind: type, custom_type: type[Message]) -> Any:
         found = " and ".join(f"{adapter.__module__}.{adapter.__qualname__}" for adapter in imported)
         raise AdapterNotFoundError(f"{name} has more than one adapter: {found}; pass the one to use")
     raise AdapterNotFoundError(
-        f"{name} has no adapter for {NAMES[kind]}; pass the adapter, or import it first, "
+        f"{name} has no adapter for {kind.examples}; pass the adapter, or import it first, "
         "or generate one with rosidl-proto generate"
     )
 
@@ -107,8 +182,8 @@ def _subclasses(base: type) -> Iterator[Any]:
         yield from _subclasses(subclass)
 
 
-def _is_for(kind: type, adapter: Any, custom_type: type[Message]) -> bool:
+def _is_for(kind: Kind, adapter: Any, custom_type: type[Message]) -> bool:
     try:
-        return CUSTOM_TYPE[kind](adapter) is custom_type
+        return kind.custom_type(adapter) is custom_type
     except AttributeError:  # a base class of adapters, which has no types yet
         return False

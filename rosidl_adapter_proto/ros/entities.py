@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from typing import Any, Generic
 
@@ -14,14 +13,13 @@ import rclpy.subscription
 import rclpy.task
 
 from rosidl_adapter_proto.adapter import CustomT, RequestT, ResponseT, ServiceAdapter, TypeAdapter
-from rosidl_adapter_proto.errors import ConversionError
-from rosidl_adapter_proto.ros.conversion import (
-    Reception,
-    convert_in,
-    imitate,
-    serialize,
-    to_ros_message,
-    wrong_type,
+from rosidl_adapter_proto.ros.adapters import RosMessage
+from rosidl_adapter_proto.ros.inbound import NO_RESPONSE, Reception, service_callback
+from rosidl_adapter_proto.ros.outbound import to_ros_message, wrong_type
+from rosidl_adapter_proto.ros.rclpy_internals import (
+    callback_of_service,
+    convert_result,
+    set_callback_of_service,
 )
 
 # rclpy's classes are generic in newer versions only, and then in the ROS type.
@@ -37,8 +35,10 @@ class Publisher(rclpy.publisher.Publisher, Generic[CustomT]):
     """
 
     adapter: type[TypeAdapter[CustomT, Any]]
+    _custom_type: type[CustomT]
+    _to_cdr: Callable[[CustomT], bytes]
 
-    def publish(self, msg: CustomT | Any) -> None:
+    def publish(self, msg: CustomT | RosMessage | bytes) -> None:
         """Send a message.
 
         Args:
@@ -48,11 +48,8 @@ class Publisher(rclpy.publisher.Publisher, Generic[CustomT]):
             ConversionError: A value does not fit the ROS type; nothing is sent.
             TypeError: It is none of these.
         """
-        # An inactive lifecycle publisher sends nothing, so there is nothing to convert.
-        if not getattr(self, "is_activated", True):
-            return
-        if isinstance(msg, self.adapter.custom_type):
-            msg = serialize(self.adapter, msg)
+        if isinstance(msg, self._custom_type):
+            msg = self._to_cdr(msg)
         elif not isinstance(msg, (bytes, self.msg_type)):
             raise wrong_type(self.adapter, msg, f"the publisher of {self.topic_name}")
         super().publish(msg)
@@ -61,7 +58,10 @@ class Publisher(rclpy.publisher.Publisher, Generic[CustomT]):
 class LifecyclePublisher(rclpy.lifecycle.LifecyclePublisher, Publisher[CustomT]):
     """A publisher of protobuf messages that sends only while its lifecycle node is active."""
 
-    publish = Publisher.publish
+    def publish(self, msg: CustomT | RosMessage | bytes) -> None:
+        """Send a message, as `Publisher.publish` does; while the node is inactive, look at nothing and send nothing."""
+        if self.is_activated:
+            Publisher.publish(self, msg)
 
 
 class Subscription(rclpy.subscription.Subscription, Generic[CustomT]):
@@ -86,15 +86,11 @@ class Subscription(rclpy.subscription.Subscription, Generic[CustomT]):
     @property
     def callback(self) -> Callable[..., Any]:
         """What the executor calls; set to a callback for protobuf messages."""
-        return self._callback
+        return super().callback
 
     @callback.setter
     def callback(self, value: Callable[..., Any]) -> None:
         rclpy.subscription.Subscription.callback.fset(self, self._reception.callback(value))  # type: ignore[attr-defined]
-
-
-class _NoResponse:
-    """Stands for the response to a request that was dropped."""
 
 
 class Service(rclpy.service.Service, Generic[RequestT, ResponseT]):
@@ -118,14 +114,13 @@ class Service(rclpy.service.Service, Generic[RequestT, ResponseT]):
     @property
     def callback(self) -> Callable[..., Any]:  # type: ignore[override]
         """What the executor calls; set to a callback for protobuf messages."""
-        callback: Callable[..., Any] = vars(self)["callback"]
-        return callback
+        return callback_of_service(self)
 
     @callback.setter
     def callback(self, value: Callable[..., Any]) -> None:
-        vars(self)["callback"] = service_callback(self.adapter, value, self._reception)
+        set_callback_of_service(self, service_callback(self.adapter, value, self._reception))
 
-    def send_response(self, response: ResponseT | Any, header: Any) -> None:
+    def send_response(self, response: ResponseT | RosMessage, header: Any) -> None:
         """Send a response.
 
         Args:
@@ -136,32 +131,9 @@ class Service(rclpy.service.Service, Generic[RequestT, ResponseT]):
             ConversionError: A value does not fit the ROS type; nothing is sent.
             TypeError: It is neither.
         """
-        if not isinstance(response, _NoResponse):
+        if response is not NO_RESPONSE:
             what = f"the response of {self.service_name}"
             super().send_response(to_ros_message(self.adapter.response, response, what), header)
-
-
-def service_callback(
-    adapter: type[ServiceAdapter[RequestT, ResponseT]],
-    callback: Callable[..., Any],
-    reception: Reception[RequestT],
-) -> Callable[..., Any]:
-    """Return the callback for rclpy that calls a user's callback with a protobuf request and an empty response."""
-    what = f"the response of {adapter.type_name}"
-
-    async def await_callback(request: Any, response: Any) -> Any:
-        custom_request = reception(request)
-        if custom_request is None:
-            return _NoResponse()
-        return to_ros_message(adapter.response, await callback(custom_request, adapter.response.new()), what)
-
-    def call_callback(request: Any, response: Any) -> Any:
-        custom_request = reception(request)
-        if custom_request is None:
-            return _NoResponse()
-        return to_ros_message(adapter.response, callback(custom_request, adapter.response.new()), what)
-
-    return imitate(callback, await_callback, call_callback)
 
 
 class Client(rclpy.client.Client, Generic[RequestT, ResponseT]):
@@ -174,7 +146,7 @@ class Client(rclpy.client.Client, Generic[RequestT, ResponseT]):
 
     adapter: type[ServiceAdapter[RequestT, ResponseT]]
 
-    def call(self, request: RequestT | Any, timeout_sec: float | None = None) -> ResponseT | None:
+    def call(self, request: RequestT | RosMessage, timeout_sec: float | None = None) -> ResponseT | None:
         """Make a request and wait for the response, as `rclpy.client.Client.call` does.
 
         Raises:
@@ -185,7 +157,7 @@ class Client(rclpy.client.Client, Generic[RequestT, ResponseT]):
         response: ResponseT | None = super().call(self._ros_request(request), timeout_sec)
         return response
 
-    def call_async(self, request: RequestT | Any) -> rclpy.task.Future[ResponseT]:
+    def call_async(self, request: RequestT | RosMessage) -> rclpy.task.Future[ResponseT]:
         """Make a request, and return a future of the response.
 
         A response that cannot be converted is the ConversionError of the future.
@@ -198,37 +170,5 @@ class Client(rclpy.client.Client, Generic[RequestT, ResponseT]):
         convert_result(future, self.adapter.response)
         return future
 
-    def _ros_request(self, request: RequestT | Any) -> Any:
+    def _ros_request(self, request: RequestT | RosMessage) -> Any:
         return to_ros_message(self.adapter.request, request, f"the client of {self.service_name}")
-
-
-class ConvertedFuture(rclpy.task.Future):
-    """A future whose result is converted when it is first asked for, in the thread that asks."""
-
-    _adapter: type[TypeAdapter[Any, Any]] | None
-    _conversion_lock: threading.Lock
-
-    def result(self) -> Any:
-        """Return the protobuf message, None while there is none, or raise what went wrong."""
-        self._convert()
-        return super().result()
-
-    def exception(self) -> Exception | None:
-        """Return what went wrong, if anything."""
-        self._convert()
-        return super().exception()
-
-    def _convert(self) -> None:
-        with self._conversion_lock:
-            if self._adapter is None or self._result is None:
-                return
-            try:
-                self._result = self._adapter.convert_to_custom(self._result)
-            except ConversionError as error:
-                self._exception = error
-            self._adapter = None
-
-
-def convert_result(future: rclpy.task.Future[Any], adapter: type[TypeAdapter[Any, Any]]) -> None:
-    """Make the result of a future a protobuf message; it may be done already."""
-    convert_in(future, ConvertedFuture, _adapter=adapter, _conversion_lock=threading.Lock())

@@ -1,58 +1,55 @@
 """Nodes that create publishers, subscriptions, services and clients for protobuf messages, and functions that do.
 
-Each takes an adapter, a protobuf class or a ROS type. For a ROS type it does what a node of rclpy does.
+Each takes an adapter, a protobuf class or a ROS type. This file says to type checkers which of these makes what, and to
+people what it does; `creation.py` does it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, cast, overload
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, overload
 
 import rclpy.lifecycle
 import rclpy.node
-import rclpy.publisher
 
-from rosidl_adapter_proto.adapter import (
-    CustomT,
-    RequestT,
-    ResponseT,
-    ServiceAdapter,
-    TypeAdapter,
-)
-from rosidl_adapter_proto.ros.adapters import find_adapter
-from rosidl_adapter_proto.ros.conversion import (
-    OnConversionError,
-    Reception,
-    combined,
-    convert_in,
-    deserialize,
-)
+from rosidl_adapter_proto.adapter import CustomT, RequestT, ResponseT, ServiceAdapter, TypeAdapter
+from rosidl_adapter_proto.ros import creation
+from rosidl_adapter_proto.ros.adapters import RosMessage, RosService
 from rosidl_adapter_proto.ros.entities import (
     Client,
     LifecyclePublisher,
     Publisher,
     Service,
     Subscription,
-    service_callback,
 )
-from rosidl_adapter_proto.ros.type_hash import check_type_hash, publishers_of_other_versions
+from rosidl_adapter_proto.ros.inbound import OnConversionError
 
 if TYPE_CHECKING:
     import rclpy.client
+    import rclpy.publisher
     import rclpy.service
     import rclpy.subscription
-    from google.protobuf.message import Message
     from rclpy.callback_groups import CallbackGroup
     from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
     from rclpy.qos import QoSProfile
     from rclpy.qos_overriding_options import QoSOverridingOptions
     from rclpy.subscription import MessageInfo
     from rclpy.subscription_content_filter_options import ContentFilterOptions
-    from rclpy.type_support import MsgT
     from typing_extensions import Unpack
 
-    MessageT = TypeVar("MessageT", bound=Message)
+    RosMessageT = TypeVar("RosMessageT", bound=RosMessage)
+    MessageT = TypeVar("MessageT")
+
+    MessageType = type[TypeAdapter[CustomT, Any]] | type[CustomT]
+    """An adapter, or a protobuf class that has one."""
+
+    Callback = Callable[[MessageT], object] | Callable[[MessageT, MessageInfo], object]
+    """Takes a message, and its MessageInfo if it wants to."""
+
+    ServiceCallback = Callable[
+        [RequestT, ResponseT], ResponseT | RosMessage | Coroutine[Any, Any, ResponseT | RosMessage]
+    ]
+    """Takes a request and an empty response, and returns the response; or is a coroutine function that does."""
 
     class PublisherOptions(TypedDict, total=False):
         """What `rclpy.node.Node.create_publisher` takes besides."""
@@ -84,10 +81,6 @@ if TYPE_CHECKING:
         callback_group: CallbackGroup | None
 
 
-ServiceCallback = Callable[[RequestT, ResponseT], Any]
-"""Returns the response, or is a coroutine function that does."""
-
-
 class NodeMixin:
     """Makes another node class create things for protobuf messages too, as in `class Camera(NodeMixin, LifecycleNode)`.
 
@@ -110,7 +103,7 @@ class NodeMixin:
     @overload
     def create_publisher(
         self: Any,
-        msg_type: type[TypeAdapter[CustomT, Any]],
+        msg_type: MessageType[CustomT],
         topic: str,
         qos_profile: QoSProfile | int,
         **options: Unpack[PublisherOptions],
@@ -119,20 +112,11 @@ class NodeMixin:
     @overload
     def create_publisher(
         self: Any,
-        msg_type: type[MessageT],
+        msg_type: type[RosMessageT],
         topic: str,
         qos_profile: QoSProfile | int,
         **options: Unpack[PublisherOptions],
-    ) -> Publisher[MessageT]: ...
-
-    @overload
-    def create_publisher(
-        self: Any,
-        msg_type: type[MsgT],
-        topic: str,
-        qos_profile: QoSProfile | int,
-        **options: Unpack[PublisherOptions],
-    ) -> rclpy.publisher.Publisher[MsgT]: ...
+    ) -> rclpy.publisher.Publisher[RosMessageT]: ...
 
     def create_publisher(
         self: Any, msg_type: Any, topic: str, qos_profile: QoSProfile | int, **options: Any
@@ -153,21 +137,12 @@ class NodeMixin:
             RosNotFoundError: The ROS message class cannot be imported.
             TypeHashError: The adapter was generated for another version of the type than the installed one.
         """
-        create = _method_of_base(self, "create_publisher")
-        adapter = find_adapter(TypeAdapter, msg_type)
-        if adapter is None:
-            return create(msg_type, topic, qos_profile, **options)
-        check_type_hash(adapter, adapter.ros_message_type, self.get_logger())
-        rclpy_class = options.pop("publisher_class", rclpy.publisher.Publisher)
-        options["publisher_class"] = combined(Publisher, rclpy_class)
-        publisher = create(adapter.ros_message_type, topic, qos_profile, **options)
-        publisher.adapter = adapter
-        return publisher
+        return creation.create_publisher(_node_of_rclpy(self), msg_type, topic, qos_profile, **options)
 
     @overload
     def create_lifecycle_publisher(
         self: Any,
-        msg_type: type[TypeAdapter[CustomT, Any]],
+        msg_type: MessageType[CustomT],
         topic: str,
         qos_profile: QoSProfile | int,
         **options: Unpack[LifecyclePublisherOptions],
@@ -176,40 +151,26 @@ class NodeMixin:
     @overload
     def create_lifecycle_publisher(
         self: Any,
-        msg_type: type[MessageT],
+        msg_type: type[RosMessageT],
         topic: str,
         qos_profile: QoSProfile | int,
         **options: Unpack[LifecyclePublisherOptions],
-    ) -> LifecyclePublisher[MessageT]: ...
-
-    @overload
-    def create_lifecycle_publisher(
-        self: Any,
-        msg_type: type[MsgT],
-        topic: str,
-        qos_profile: QoSProfile | int,
-        **options: Unpack[LifecyclePublisherOptions],
-    ) -> rclpy.lifecycle.LifecyclePublisher[MsgT]: ...
+    ) -> rclpy.lifecycle.LifecyclePublisher[RosMessageT]: ...
 
     def create_lifecycle_publisher(
         self: Any, msg_type: Any, topic: str, qos_profile: QoSProfile | int, **options: Any
     ) -> Any:
         """Create a publisher that sends only while its lifecycle node is active; else as `create_publisher`."""
-        create = _method_of_base(self, "create_lifecycle_publisher")
-        adapter = find_adapter(TypeAdapter, msg_type)
-        if adapter is None:
-            return create(msg_type, topic, qos_profile, **options)
-        check_type_hash(adapter, adapter.ros_message_type, self.get_logger())
-        publisher = create(adapter.ros_message_type, topic, qos_profile, **options)
-        convert_in(publisher, LifecyclePublisher, adapter=adapter)
-        return publisher
+        return creation.create_lifecycle_publisher(
+            _node_of_rclpy(self), msg_type, topic, qos_profile, **options
+        )
 
     @overload
     def create_subscription(
         self: Any,
-        msg_type: type[TypeAdapter[CustomT, Any]],
+        msg_type: MessageType[CustomT],
         topic: str,
-        callback: Callable[[CustomT], object] | Callable[[CustomT, MessageInfo], object],
+        callback: Callback[CustomT],
         qos_profile: QoSProfile | int,
         *,
         raw: Literal[False] = False,
@@ -220,34 +181,21 @@ class NodeMixin:
     @overload
     def create_subscription(
         self: Any,
-        msg_type: type[MessageT],
+        msg_type: type[RosMessageT],
         topic: str,
-        callback: Callable[[MessageT], object] | Callable[[MessageT, MessageInfo], object],
-        qos_profile: QoSProfile | int,
-        *,
-        raw: Literal[False] = False,
-        on_conversion_error: OnConversionError | None = None,
-        **options: Unpack[SubscriptionOptions],
-    ) -> Subscription[MessageT]: ...
-
-    @overload
-    def create_subscription(
-        self: Any,
-        msg_type: type[MsgT],
-        topic: str,
-        callback: Callable[[MsgT], object] | Callable[[MsgT, MessageInfo], object],
+        callback: Callback[RosMessageT],
         qos_profile: QoSProfile | int,
         *,
         raw: Literal[False] = False,
         **options: Unpack[SubscriptionOptions],
-    ) -> rclpy.subscription.Subscription[MsgT]: ...
+    ) -> rclpy.subscription.Subscription[RosMessageT]: ...
 
     @overload
     def create_subscription(
         self: Any,
-        msg_type: type[Any],
+        msg_type: MessageType[Any] | type[RosMessage],
         topic: str,
-        callback: Callable[[bytes], object] | Callable[[bytes, MessageInfo], object],
+        callback: Callback[bytes],
         qos_profile: QoSProfile | int,
         *,
         raw: Literal[True],
@@ -260,9 +208,6 @@ class NodeMixin:
         topic: str,
         callback: Callable[..., Any],
         qos_profile: QoSProfile | int,
-        *,
-        raw: bool = False,
-        on_conversion_error: OnConversionError | None = None,
         **options: Any,
     ) -> Any:
         """Create a subscription.
@@ -286,36 +231,14 @@ class NodeMixin:
             TypeHashError: The adapter was generated for another version of the type than the installed one.
             TypeError: `on_conversion_error` is given, and nothing is to be converted.
         """
-        node = cast(rclpy.node.Node, self)
-        create = _method_of_base(node, "create_subscription")
-        adapter = find_adapter(TypeAdapter, msg_type)
-        if on_conversion_error is not None and (adapter is None or raw):
-            raise TypeError(
-                f"the subscription to {topic} converts nothing, so it takes no on_conversion_error; "
-                "leave it out, or give an adapter and no `raw`"
-            )
-        if adapter is None:
-            return create(msg_type, topic, callback, qos_profile, raw=raw, **options)
-        ros_type = adapter.ros_message_type
-        check_type_hash(adapter, ros_type, node.get_logger())
-        if raw:
-            return create(ros_type, topic, callback, qos_profile, raw=True, **options)
-
-        def explain() -> str:
-            others = publishers_of_other_versions(node, topic, adapter.type_hash)
-            return f"; publishers with another version of the type: {', '.join(others)}" if others else ""
-
-        reception: Reception[Any] = Reception(
-            node, f"topic {topic}", partial(deserialize, adapter), on_conversion_error, explain, bytes
+        return creation.create_subscription(
+            _node_of_rclpy(self), msg_type, topic, callback, qos_profile, **options
         )
-        subscription = create(ros_type, topic, reception.callback(callback), qos_profile, raw=True, **options)
-        convert_in(subscription, Subscription, adapter=adapter, _reception=reception)
-        return subscription
 
     @overload
     def create_service(
         self: Any,
-        srv_type: type[ServiceAdapter[RequestT, ResponseT]],
+        srv_type: type[ServiceAdapter[RequestT, ResponseT]] | type[RequestT],
         srv_name: str,
         callback: ServiceCallback[RequestT, ResponseT],
         *,
@@ -326,31 +249,14 @@ class NodeMixin:
     @overload
     def create_service(
         self: Any,
-        srv_type: type[MessageT],
-        srv_name: str,
-        callback: ServiceCallback[MessageT, Any],
-        *,
-        on_conversion_error: OnConversionError | None = None,
-        **options: Unpack[ServiceOptions],
-    ) -> Service[MessageT, Any]: ...
-
-    @overload
-    def create_service(
-        self: Any,
-        srv_type: type[Any],
+        srv_type: type[RosService],
         srv_name: str,
         callback: Callable[[Any, Any], Any],
         **options: Unpack[ServiceOptions],
     ) -> rclpy.service.Service[Any, Any]: ...
 
     def create_service(
-        self: Any,
-        srv_type: Any,
-        srv_name: str,
-        callback: Callable[[Any, Any], Any],
-        *,
-        on_conversion_error: OnConversionError | None = None,
-        **options: Any,
+        self: Any, srv_type: Any, srv_name: str, callback: Callable[..., Any], **options: Any
     ) -> Any:
         """Create a service.
 
@@ -370,19 +276,7 @@ class NodeMixin:
             RosNotFoundError: The ROS service class cannot be imported.
             TypeHashError: The adapter was generated for another version of the type than the installed one.
         """
-        create = _method_of_base(self, "create_service")
-        adapter = find_adapter(ServiceAdapter, srv_type)
-        if adapter is None:
-            return create(srv_type, srv_name, callback, **options)
-        check_type_hash(adapter, adapter.ros_service_type, self.get_logger())
-        reception: Reception[Any] = Reception(
-            self, f"a client of service {srv_name}", adapter.request.convert_to_custom, on_conversion_error
-        )
-        service = create(
-            adapter.ros_service_type, srv_name, service_callback(adapter, callback, reception), **options
-        )
-        convert_in(service, Service, adapter=adapter, _reception=reception)
-        return service
+        return creation.create_service(_node_of_rclpy(self), srv_type, srv_name, callback, **options)
 
     @overload
     def create_client(
@@ -394,12 +288,18 @@ class NodeMixin:
 
     @overload
     def create_client(
-        self: Any, srv_type: type[MessageT], srv_name: str, **options: Unpack[ServiceOptions]
-    ) -> Client[MessageT, Any]: ...
+        self: Any,
+        srv_type: type[RequestT],
+        srv_name: str,
+        **options: Unpack[ServiceOptions],
+    ) -> Client[RequestT, Any]: ...
 
     @overload
     def create_client(
-        self: Any, srv_type: type[Any], srv_name: str, **options: Unpack[ServiceOptions]
+        self: Any,
+        srv_type: type[RosService],
+        srv_name: str,
+        **options: Unpack[ServiceOptions],
     ) -> rclpy.client.Client[Any, Any]: ...
 
     def create_client(self: Any, srv_type: Any, srv_name: str, **options: Any) -> Any:
@@ -418,14 +318,7 @@ class NodeMixin:
             RosNotFoundError: The ROS service class cannot be imported.
             TypeHashError: The adapter was generated for another version of the type than the installed one.
         """
-        create = _method_of_base(self, "create_client")
-        adapter = find_adapter(ServiceAdapter, srv_type)
-        if adapter is None:
-            return create(srv_type, srv_name, **options)
-        check_type_hash(adapter, adapter.ros_service_type, self.get_logger())
-        client = create(adapter.ros_service_type, srv_name, **options)
-        convert_in(client, Client, adapter=adapter)
-        return client
+        return creation.create_client(_node_of_rclpy(self), srv_type, srv_name, **options)
 
 
 class Node(NodeMixin, rclpy.node.Node):  # type: ignore[misc]  # takes more types than the methods of rclpy
@@ -439,9 +332,6 @@ create_service = NodeMixin.create_service
 create_client = NodeMixin.create_client
 
 
-def _method_of_base(node: Any, name: str) -> Callable[..., Any]:
-    """Return the method of a node that knows only ROS types: if it has the mixin, that of the class behind it."""
-    method: Callable[..., Any] = getattr(
-        super(NodeMixin, node) if isinstance(node, NodeMixin) else node, name
-    )
-    return method
+def _node_of_rclpy(node: Any) -> Any:
+    """Return a node whose methods take only ROS types: if it has the mixin, what is behind that."""
+    return super(NodeMixin, node) if isinstance(node, NodeMixin) else node

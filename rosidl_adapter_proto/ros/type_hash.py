@@ -9,13 +9,15 @@ import json
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.exceptions import InvalidHandle
-from rclpy.impl.rcutils_logger import RcutilsLogger
-from rclpy.node import Node
 
 from rosidl_adapter_proto.errors import Error
+
+if TYPE_CHECKING:
+    from rclpy.impl.rcutils_logger import RcutilsLogger
+    from rclpy.node import Node
 
 
 class TypeHashError(Error):
@@ -71,8 +73,11 @@ def _installed_type_hash(type_name: str, package: str) -> tuple[str | None, Path
     return None, file
 
 
-def publishers_of_other_versions(node: Node, topic: str, type_hash: str) -> list[str]:
-    """Return the publishers of a topic that announce another type hash than the given one, for people."""
+def publishers_of_other_versions(node: Node, topic: str, adapter: Any) -> list[str]:
+    """Return the publishers of a topic that announce another type hash than an adapter has, for people."""
+    type_hash = getattr(adapter, "type_hash", None)
+    if type_hash is None:
+        return []
     try:
         publishers = node.get_publishers_info_by_topic(node.resolve_topic_name(topic))
     except InvalidHandle:  # the node is being destroyed

@@ -9,8 +9,15 @@ import pytest
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces import store
 from rosidl_adapter_proto.interfaces.catalog import Catalog
-from rosidl_adapter_proto.interfaces.closure import closure
-from rosidl_adapter_proto.interfaces.find import file_source, folder_source, prefix_sources, store_source
+from rosidl_adapter_proto.interfaces.closure import closure, type_closure
+from rosidl_adapter_proto.interfaces.find import (
+    file_source,
+    folder_source,
+    installed_sources,
+    prefix_sources,
+    store_source,
+    text_source,
+)
 from rosidl_adapter_proto.interfaces.model import Action, Message, Service, TypeName
 
 SERVICE, ACTION = "int8 a\n---\nint8 b\n", "int8 a\n---\nint8 b\n---\nint8 c\n"
@@ -256,6 +263,26 @@ def test_prefixes_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert fields == {"a": "a", "b": "b", "c": "c"}
 
 
+def test_everything_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.setattr(sys, "prefix", str(prefix(tmp_path, "int8 a")))
+    origins = [each.origin for each in installed_sources("kilted")]
+    assert origins == [f"ROS prefix {tmp_path}", "embedded store kilted"]
+
+
+def test_texts() -> None:
+    texts = {"a/msg/A": "int8 a", "a/srv/Do": "---\nint8 b", "b/action/Go": "---\n---\nint8 c"}
+    source = text_source({name(each): text for each, text in texts.items()})
+    assert {package: [str(each) for each in found] for package, found in source.packages.items()} == {
+        "a": ["a/msg/A", "a/srv/Do"],
+        "b": ["b/action/Go"],
+    }
+    catalog = Catalog((source,))
+    assert catalog.message(name("b/action/Go_Feedback")).fields[0].name == "c"
+    with pytest.raises(DefinitionError, match=r"^a/msg/B:1:1: expected a type and a name, found only 'int8'"):
+        _ = text_source({name("a/msg/B"): "int8"}).packages["a"][name("a/msg/B")].interface
+
+
 def test_without_ament_prefix_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     monkeypatch.setattr(sys, "prefix", str(prefix(tmp_path, "")))
@@ -417,6 +444,32 @@ CHAIN = {
 def test_closure(packages: list[str], types: list[str], expected: str, tmp_path: Path) -> None:
     catalog = read(tmp_path, CHAIN)
     assert " ".join(map(str, closure(catalog, packages, map(name, types)))) == expected
+
+
+@pytest.mark.parametrize(
+    ("type_name", "expected"),
+    [
+        ("a/msg/A", "c/msg/C b/msg/B a/msg/A"),
+        ("c/msg/C", "c/msg/C"),
+        ("b/msg/Other", "d/msg/D b/msg/Other"),
+        ("s/srv/Do_Response", "c/msg/C b/msg/B s/srv/Do"),
+    ],
+)
+def test_closure_of_a_type(type_name: str, expected: str, tmp_path: Path) -> None:
+    """Nothing is read but what the type refers to: other definitions may be wrong."""
+    files = {**CHAIN, "s/srv/Do.srv": "---\nb/B b", "a/msg/Wrong.msg": "!", "b/msg/Lost.msg": "lost/A a"}
+    catalog = read(tmp_path, files)
+    assert " ".join(map(str, type_closure(catalog, name(type_name)))) == expected
+
+
+def test_a_type_that_needs_what_there_is_not(tmp_path: Path) -> None:
+    catalog = read(tmp_path, {"a/msg/A.msg": "b/B b\nc/C c"})
+    with pytest.raises(DefinitionError) as caught:
+        type_closure(catalog, name("a/msg/A"))
+    assert str(caught.value).splitlines()[:-1] == [
+        f"b/msg/B was not found, but a/msg/A.b ({tmp_path}/a/msg/A.msg:1:5) needs it",
+        f"c/msg/C was not found, but a/msg/A.c ({tmp_path}/a/msg/A.msg:2:5) needs it",
+    ]
 
 
 def test_closure_of_services_and_actions(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
     messages,
+    parts,
     references,
     value_type,
 )
@@ -116,6 +117,25 @@ def test_the_messages_of_an_action() -> None:
         *("Goal", "Result", "Feedback", "SendGoal_Request", "SendGoal_Response", "SendGoal_Event"),
         *("GetResult_Request", "GetResult_Response", "GetResult_Event", "FeedbackMessage"),
     ]
+
+
+def test_parts() -> None:
+    assert parts(Message(FOO, ())) == {}
+    own = {"request": DO.sibling("_Request"), "response": DO.sibling("_Response")}
+    assert parts(SERVICE) == {DO: own}
+    send_goal, get_result = GO.sibling("_SendGoal"), GO.sibling("_GetResult")
+    assert parts(ACTION) == {
+        GO: {
+            "goal": GO.sibling("_Goal"),
+            "result": GO.sibling("_Result"),
+            "feedback": GO.sibling("_Feedback"),
+            "send_goal": send_goal,
+            "get_result": get_result,
+            "feedback_message": GO.sibling("_FeedbackMessage"),
+        },
+        send_goal: {"request": send_goal.sibling("_Request"), "response": send_goal.sibling("_Response")},
+        get_result: {"request": get_result.sibling("_Request"), "response": get_result.sibling("_Response")},
+    }
 
 
 def messages_of_parts() -> list[Message]:

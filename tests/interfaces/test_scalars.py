@@ -5,14 +5,15 @@ from collections import Counter
 
 import pytest
 
-from rosidl_adapter_proto.interfaces import idl, msg
+from rosidl_adapter_proto.interfaces import msg
+from rosidl_adapter_proto.interfaces.idl import values
 from rosidl_adapter_proto.interfaces.model import BasicType, StringType
 from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, SCALARS, CdrForm, Family, Scalar
 
 ROWS = pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
 
 
-@pytest.mark.parametrize("table", [msg._VALUE_READERS, idl._FITTERS])
+@pytest.mark.parametrize("table", [msg._VALUE_READERS, values.FITTERS])
 def test_tables_by_family_are_complete(table: dict[Family, object]) -> None:
     assert table.keys() == set(Family)
 

@@ -147,6 +147,49 @@ def test_adapters_of_other_protobuf_classes(node: Any, adapter: Any) -> None:
         node.create_publisher(TextAdapter.custom_type, "mine", 10)
 
 
+def test_adapters_made_at_run_time(
+    node: Any, adapter: Any, text: Any, native_node: Any, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody generated them, so they may know little more than their conversions, and no module has them."""
+    from rosidl_adapter_proto.adapter import ServiceAdapter, TypeAdapter
+
+    def made(given: Any) -> Any:
+        class MadeAdapter(TypeAdapter[Any, Any]):
+            custom_type = given.custom_type
+            ros_message_type = given.ros_message_type
+            fields = ()
+
+            @staticmethod
+            def convert_to_ros_message(source: Any, destination: Any = None) -> Any:
+                return given.convert_to_ros_message(source)
+
+            @staticmethod
+            def convert_to_custom(source: Any, destination: Any = None) -> Any:
+                return given.convert_to_custom(source)
+
+        return MadeAdapter
+
+    received = Received()
+    text_adapter = made(adapter)
+    subscription = node.create_subscription(text_adapter, "made", received.method, 10)
+    connected(node.create_publisher(text_adapter, "made", 10)).publish(text("hello"))
+    assert received.next() == text("hello")
+    connected(native_node.create_publisher(adapter.ros_message_type, "made", 10)).publish(TOO_LONG)
+    wait_until(lambda: subscription.conversion_errors == 1)
+    log = "MadeAdapter: 8 bytes are not a serialized message of this type: "
+    wait_until(lambda: log in capfd.readouterr().err, "the log")
+
+    set_bool = examples.adapter("std_srvs/srv/SetBool")
+    parts = {name: made(getattr(set_bool, name)) for name in ("request", "response")}
+    ros_service_type = examples.ros_class("std_srvs/srv/SetBool")
+    switch = type("SwitchAdapter", (ServiceAdapter,), {**parts, "ros_service_type": ros_service_type})
+    make_request, make_response = (parts[name].custom_type for name in ("request", "response"))
+    node.create_service(switch, "made", lambda request, response: make_response(success=request.data))
+    client = node.create_client(switch, "made")
+    assert client.wait_for_service(SECONDS)
+    assert client.call(make_request(data=True), SECONDS) == make_response(success=True)
+
+
 def test_adapters_of_another_kind(node: Any, adapter: Any) -> None:
     from rosidl_adapter_proto.ros import ActionClient, AdapterNotFoundError
 
@@ -467,7 +510,7 @@ def test_publishers_of_other_versions_are_named(adapter: Any) -> None:
     node: Any = SimpleNamespace(
         get_publishers_info_by_topic=lambda topic: endpoints, resolve_topic_name=lambda topic: topic
     )
-    assert publishers_of_other_versions(node, "/topic", adapter.type_hash) == ["/old/robot (RIHS01_00)"]
+    assert publishers_of_other_versions(node, "/topic", adapter) == ["/old/robot (RIHS01_00)"]
 
 
 def test_an_error_of_a_callback_reaches_the_executor(ros: None, adapter: Any, text: Any) -> None:

@@ -15,9 +15,11 @@ namespace rosidl_proto {
 #if defined(_MSC_VER)
 #define ROSIDL_PROTO_INLINE __forceinline
 #define ROSIDL_PROTO_INLINE_LAMBDA
+#define ROSIDL_PROTO_NO_INLINE __declspec(noinline)
 #else
 #define ROSIDL_PROTO_INLINE __attribute__((always_inline)) inline
 #define ROSIDL_PROTO_INLINE_LAMBDA __attribute__((always_inline))
+#define ROSIDL_PROTO_NO_INLINE __attribute__((noinline))
 #endif
 
 // How one element lies in CDR, and what its values are: the names and numbers of `CdrForm` in

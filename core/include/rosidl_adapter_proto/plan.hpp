@@ -13,6 +13,9 @@
 
 namespace rosidl_proto {
 
+// The version of packed plans, which is a digit in them: VERSION in plan.py.
+constexpr int kPlanVersion = 2;
+
 // Deeper nesting is refused. Plans cannot recur, so this bounds the stack for every input.
 constexpr uint32_t kMaximumDepth = 100;
 

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import rclpy.client
+import rclpy.lifecycle
 import rclpy.node
 import rclpy.publisher
+import rclpy.service
 import rclpy.subscription
+import std_msgs.msg  # type: ignore[import-untyped]
+import std_srvs.srv  # type: ignore[import-untyped]
+import test_msgs.action  # type: ignore[import-untyped]
+from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.subscription import MessageInfo
 from rosidl_proto.std_msgs.msg import String, StringAdapter
 from rosidl_proto.std_srvs.srv import SetBool_Request, SetBool_Response, SetBoolAdapter
@@ -23,18 +30,27 @@ from rosidl_adapter_proto.ros import (
     ActionClient,
     ActionServer,
     Client,
+    LifecyclePublisher,
     Node,
+    NodeMixin,
     Publisher,
     ServerGoalHandle,
     Service,
     Subscription,
+    create_client,
+    create_lifecycle_publisher,
     create_publisher,
+    create_service,
     create_subscription,
 )
 
 
 class Native:
-    """Stands for a ROS message class, which type checkers know nothing of."""
+    """Stands for a ROS message class: this is how type checkers know one, where they know it at all."""
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        return {}
 
 
 class Talker(Node):
@@ -52,7 +68,11 @@ class Talker(Node):
         self.native = self.create_publisher(Native, "native", 10)
         self.service = self.create_service(SetBoolAdapter, "set", self.on_request)
         self.client = self.create_client(SetBoolAdapter, "set")
-        self.create_service(SetBool_Request, "set", self.on_request)
+        self.service_by_request = self.create_service(SetBool_Request, "set", self.on_request)
+        self.create_service(SetBoolAdapter, "set", self.on_request_later)
+        self.create_service(SetBool_Request, "set", lambda request, response: response)
+        self.create_service(SetBoolAdapter, "set", lambda request, response: response)
+        self.client_by_request = self.create_client(SetBool_Request, "set")
         self.server = ActionServer(self, FibonacciAdapter, "fibonacci", self.execute)
         self.action_client = ActionClient(self, FibonacciAdapter, "fibonacci")
         self.by_goal: ActionClient[Any, Any, Any] = ActionClient(self, Fibonacci_Goal, "fibonacci")
@@ -75,6 +95,29 @@ class Talker(Node):
     def on_request(self, request: SetBool_Request, response: SetBool_Response) -> SetBool_Response:
         response.success = request.data
         return response
+
+    async def on_request_later(
+        self, request: SetBool_Request, response: SetBool_Response
+    ) -> SetBool_Response:
+        return response
+
+    async def execute_later(
+        self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
+    ) -> Fibonacci_Result:
+        return Fibonacci_Result()
+
+    def on_goal(self, goal: Fibonacci_Goal) -> GoalResponse:
+        return GoalResponse.ACCEPT if goal.order < 10 else GoalResponse.REJECT
+
+    def on_accepted(
+        self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
+    ) -> None:
+        goal_handle.execute()
+
+    async def on_cancel(
+        self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
+    ) -> CancelResponse:
+        return CancelResponse.ACCEPT
 
     def execute(
         self, goal_handle: ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
@@ -103,3 +146,51 @@ def check(talker: Talker, node: rclpy.node.Node) -> None:
     create_subscription(node, StringAdapter, "chatter", print, 10)
     annotated: rclpy.publisher.Publisher[Any] = talker.publisher
     annotated.publish(String())
+
+
+def check_what_a_request_or_a_goal_tells(talker: Talker) -> None:
+    """What they do not tell comes from the callback, or is not known."""
+    assert_type(talker.service_by_request, Service[SetBool_Request, SetBool_Response])
+    assert_type(talker.client_by_request, Client[SetBool_Request, Any])
+    known: Client[SetBool_Request, SetBool_Response] = talker.create_client(SetBool_Request, "set")
+    assert_type(known.call(SetBool_Request()), SetBool_Response | None)
+    server = ActionServer(talker, Fibonacci_Goal, "fibonacci", talker.execute)
+    assert_type(server, ActionServer[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback])
+    ActionServer(
+        talker,
+        FibonacciAdapter,
+        "fibonacci",
+        talker.execute_later,
+        goal_callback=talker.on_goal,
+        handle_accepted_callback=talker.on_accepted,
+        cancel_callback=talker.on_cancel,
+        result_timeout=20,
+    )
+    client = ActionClient(talker, Fibonacci_Goal, "fibonacci")
+    assert_type(client, ActionClient[Fibonacci_Goal, Any, Any])
+
+
+def check_ros_types(talker: Talker) -> None:
+    """What rosidl generates is known as such, and may be sent too."""
+    talker.publisher.publish(std_msgs.msg.String())
+    talker.client.call_async(std_srvs.srv.SetBool.Request())
+    talker.action_client.send_goal_async(test_msgs.action.Fibonacci.Goal())
+    publisher: rclpy.publisher.Publisher[Any] = talker.create_publisher(std_msgs.msg.String, "native", 10)
+    publisher.publish(std_msgs.msg.String())
+    talker.create_subscription(std_msgs.msg.String, "native", print, 10)
+    talker.create_subscription(std_msgs.msg.String, "native", talker.on_bytes, 10, raw=True)
+    service: rclpy.service.Service[Any, Any] = talker.create_service(std_srvs.srv.SetBool, "native", max)
+    client: rclpy.client.Client[Any, Any] = talker.create_client(std_srvs.srv.SetBool, "native")
+    ActionServer(talker, test_msgs.action.Fibonacci, "native", print)
+    ActionClient(talker, test_msgs.action.Fibonacci, "native")
+    print(service, client)
+
+
+def check_functions(node: rclpy.node.Node, mixed: NodeMixin) -> None:
+    assert_type(create_lifecycle_publisher(node, StringAdapter, "chatter", 10), LifecyclePublisher[String])
+    assert_type(mixed.create_lifecycle_publisher(String, "chatter", 10), LifecyclePublisher[String])
+    assert_type(
+        mixed.create_lifecycle_publisher(Native, "native", 10), rclpy.lifecycle.LifecyclePublisher[Native]
+    )
+    assert_type(create_client(node, SetBoolAdapter, "set"), Client[SetBool_Request, SetBool_Response])
+    create_service(node, SetBoolAdapter, "set", lambda request, response: response)

@@ -1,0 +1,104 @@
+"""Golden plans: packed plans as text and as bytes, which the tests of the core read too.
+
+Whoever changes the layout of plans, or the list of CDR forms, sees it here, and `core/test` fails until the core agrees
+with it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from google.protobuf.descriptor import FieldDescriptor
+from ros_types import describe, nasty_types, protobuf_class, struct_type
+
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, CdrForm
+from rosidl_adapter_proto.transcode.plan import UNBOUNDED, VERSION, Operation, Plan, build_plan
+
+FOLDER = Path(__file__).parents[1] / "golden" / "plans"
+TYPES = {
+    **nasty_types(),
+    **struct_type("test/msg/Stamp", sec="int32", nanosec="uint32"),
+    **struct_type("test/msg/Header", stamp="test/msg/Stamp", frame_id="string"),
+    **struct_type("test/msg/Image", header="test/msg/Header", width="uint32", data="uint8[]", step="uint32"),
+}
+PLANS: dict[str, tuple[str, dict[str, Any]]] = {
+    "every_form": ("test/msg/Nasty", {}),
+    "image": ("test/msg/Image", {"omit_empty_messages": True}),
+    "chosen_fields": ("test/msg/Image", {"fields": ["header.stamp.nanosec", "width"]}),
+}
+
+
+def bound(number: int) -> str:
+    return "-" if number == UNBOUNDED else str(number)
+
+
+def operation_text(operation: Operation) -> str:
+    return (
+        f"  {operation.name} = {operation.protobuf_name or '-'}:"
+        f" type {operation.scalar}, {operation.cdr.name} to {operation.protobuf}, number {operation.number},"
+        f" {operation.shape.name} of {bound(operation.count)}, characters {bound(operation.string_bound)},"
+        f" message {operation.message}{', omitted if empty' if operation.omit_empty else ''}\n"
+    )
+
+
+def plan_text(plan: Plan) -> str:
+    """Write a plan as `core/test/golden.cpp` does."""
+    text = f"plan of version {VERSION}{', partial' if plan.partial else ''}\n"
+    for index, message in enumerate(plan.messages):
+        text += f"message {index}: {message.name} = {message.protobuf_name}\n"
+        text += "".join(map(operation_text, message.operations))
+    return text
+
+
+def golden(plan: Plan) -> str:
+    packed = plan.pack().hex()
+    lines = (packed[i : i + 100] for i in range(0, len(packed), 100))
+    return f"{plan_text(plan)}bytes\n" + "".join(f"{line}\n" for line in lines)
+
+
+def forms() -> str:
+    """Write each CDR form, and the protobuf types that its values and its arrays have."""
+    protobuf = {CdrForm.MESSAGE: {("message", "message")}}
+    for scalar in SCALARS.values():
+        if scalar.cdr is not None:
+            protobuf.setdefault(scalar.cdr, set()).add((scalar.protobuf, scalar.many))
+    text = ""
+    for form in CdrForm:
+        ((one, many),) = protobuf[form]
+        types = (getattr(FieldDescriptor, f"TYPE_{each.upper()}") for each in (one, many))
+        text += f"{form.value} {form.name} {' '.join(map(str, types))}\n"
+    return text
+
+
+def plan_of(name: str) -> Plan:
+    type_name, options = PLANS[name]
+    message_class = protobuf_class(TYPES, type_name, hashed=name == "image")
+    return build_plan(describe(TYPES, type_name), message_class.DESCRIPTOR, **options)
+
+
+def compare(name: str, text: str, request: pytest.FixtureRequest) -> None:
+    file = FOLDER / f"{name}.txt"
+    if request.config.getoption("--update-golden"):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    assert text == file.read_text(encoding="utf-8"), f"{file}: if it is meant, run: make golden"
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_golden_plan(name: str, request: pytest.FixtureRequest) -> None:
+    compare(name, golden(plan_of(name)), request)
+
+
+def test_forms(request: pytest.FixtureRequest) -> None:
+    compare("forms", forms(), request)
+
+
+def test_one_plan_has_every_form() -> None:
+    plan = plan_of("every_form")
+    assert {each.cdr for message in plan.messages for each in message.operations} == set(CdrForm)
+
+
+def test_no_other_files() -> None:
+    assert {file.stem for file in FOLDER.iterdir()} == {*PLANS, "forms"}
