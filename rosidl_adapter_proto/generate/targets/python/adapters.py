@@ -190,4 +190,4 @@ def _literal(value: ProtoScalarValue) -> str:
         return quoted(value)
     if isinstance(value, float) and not math.isfinite(value):
         return f'float("{value}")'
-    return repr(value)
+    return repr(value).replace("e+", "e")  # as black writes 1e+16

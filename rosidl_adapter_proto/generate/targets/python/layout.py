@@ -58,14 +58,15 @@ class Layout:
         return self.settled(f"{indent}from {module} import (\n{indent}    {name},\n{indent})")
 
     def assignment(self, target: str, value: str, indent: str = "") -> str:
-        """Lay out the assignment of a literal that is no list."""
-        line, inner = f"{indent}{target} = {value}", f"{indent}    {value}"
-        head = f"{indent}{target} = ("
+        """Lay out the assignment of a literal that is no list; the target may have an annotation."""
+        line, head, inner = f"{indent}{target} = {value}", f"{indent}{target} = (", f"{indent}    {value}"
         if _fits(line) or not (_is_string(value) and value.isascii() and _fits(head)):
             return line
-        if not _fits(inner):
+        if (
+            not _fits(inner) and ":" not in target
+        ):  # black has brackets around annotations, and then splits anyway
             return self.settled(line)
-        return "\n".join((head, inner, f"{indent})"))
+        return "\n".join((head, self.settled(inner), f"{indent})"))
 
     def dictionary(
         self, target: str, items: Sequence[tuple[str, str | Sequence[str]]], indent: str = ""
@@ -84,7 +85,8 @@ class Layout:
             elif isinstance(value, str):
                 lines.append(self._whole(inner + text + comma, value))
             else:
-                elements = [self._whole(f"{inner}    {each},", each) for each in value]
+                behind = "," if len(value) > 1 else ""
+                elements = [self._whole(f"{inner}    {each}{behind}", each) for each in value]
                 lines += [f"{inner}{key}: [", *elements, f"{inner}]{comma}"]
         return "\n".join([*lines, indent + "}"])
 
@@ -121,8 +123,11 @@ class Layout:
         line = f"{indent}def {name}({argument}) -> {returns}:{body}"
         if _fits(line):
             return line
-        last = self._brackets(f") -> {returns}:{body}", indent)
-        return "\n".join((f"{indent}def {name}(", f"{indent}    {argument},", *last))
+        inner = indent + "    "
+        last: Iterable[str] = self._brackets(f") -> {returns}:{body}", indent)
+        if "[" not in returns and not _fits(f"{indent}) -> {returns}:{body}"):
+            last = (f"{indent}) -> (", self.settled(inner + returns), f"{indent}):{body}")
+        return "\n".join((f"{indent}def {name}(", f"{inner}{argument},", *last))
 
     def comment(self, lines: Iterable[str], indent: str) -> str:
         """Lay out a comment, above what it is about."""
