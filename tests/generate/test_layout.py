@@ -204,44 +204,35 @@ def test_quotes(value: str | bytes) -> None:
 
 # What may stand in a line of a comment, and what black heeds there.
 WORDS = st.sampled_from(
-    [
-        "",
-        " ",
-        "  ",
-        "\t",
-        "#",
-        "type:",
-        "type: ignore",
-        "fmt: off",
-        "fmt: on",
-        "fmt: skip",
-        "noqa",
-        "!",
-        ":",
-        "'",
-        '"',
-    ]
-    + [
-        '"""',
-        "\\",
-        "\\\\",
-        "\\x4F",
-        "\\N{DASH}",
-        "\N{NO-BREAK SPACE}",
-        "字" * 50,
-        "word",
-        "word " * 20,
-        "{{",
-        "%}",
-    ]
+    (
+        *(
+            "",
+            " ",
+            "  ",
+            "\t",
+            "#",
+            "'",
+            '"',
+            '"""',
+            "\\",
+            "\\\\",
+            "\\x4F",
+            "\\N{DASH}",
+            "\N{NO-BREAK SPACE}",
+        ),
+        *("type:", "type: ignore", "fmt: off", "fmt: on", "fmt: skip", "noqa", "!", ":", "{{", "%}"),
+        *("字" * 50, "word", "word " * 20),
+    )
 )
 COMMENTS = st.lists(st.lists(WORDS, max_size=4).map("".join), max_size=4)
 NAMES = st.integers(1, 100).map(lambda length: ("name" * 25)[:length]) | st.sampled_from(
     ["from", "self", "int", "property", "none", "fields", "source", "a", "type", "cls"]
 )
 TYPES = st.sampled_from(
-    ["bool", "byte", "char", "uint8", "int16", "float32", "int64", "string", "wstring", "string<=3"]
-    + ["std_msgs/Header", "visualization_msgs/InteractiveMarkerControl", "geometry_msgs/Point"]
+    (
+        *("bool", "byte", "char", "uint8", "int16", "float32", "int64", "string", "wstring", "string<=3"),
+        *("std_msgs/Header", "visualization_msgs/InteractiveMarkerControl", "geometry_msgs/Point"),
+    )
 )
 SUFFIXES = st.sampled_from(["", "[]", "[3]", "[<=3]"])
 STRINGS = st.text(st.sampled_from("ab '\"xä字#="), max_size=100).map(
