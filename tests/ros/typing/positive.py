@@ -16,8 +16,9 @@ import test_msgs.action  # type: ignore[import-untyped]
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.subscription import MessageInfo
 from rosidl_proto.std_msgs.msg import String, StringAdapter
-from rosidl_proto.std_srvs.srv import SetBool_Request, SetBool_Response, SetBoolAdapter
+from rosidl_proto.std_srvs.srv import SetBool, SetBool_Request, SetBool_Response, SetBoolAdapter
 from rosidl_proto.test_msgs.action import (
+    Fibonacci,
     Fibonacci_Feedback,
     Fibonacci_Goal,
     Fibonacci_Result,
@@ -51,6 +52,13 @@ class Native:
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
         return {}
+
+
+class NativeService:
+    """Stands for a ROS service class."""
+
+    Request = Native
+    Response = Native
 
 
 class Talker(Node):
@@ -184,6 +192,30 @@ def check_ros_types(talker: Talker) -> None:
     ActionServer(talker, test_msgs.action.Fibonacci, "native", print)
     ActionClient(talker, test_msgs.action.Fibonacci, "native")
     print(service, client)
+    talker.create_service(NativeService, "native", print)
+    talker.create_client(NativeService, "native").call_async(Native())
+
+
+def check_names_of_services_and_actions(talker: Talker) -> None:
+    """They stand for their adapters, and have the protobuf classes under the names of ROS."""
+
+    def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        response.success = request.data
+        return response
+
+    def execute(
+        goal_handle: ServerGoalHandle[Fibonacci.Goal, Fibonacci.Result, Fibonacci.Feedback],
+    ) -> Fibonacci.Result:
+        goal_handle.publish_feedback(Fibonacci.Feedback(sequence=[1]))
+        return Fibonacci.Result()
+
+    assert_type(talker.create_service(SetBool, "set", answer), Service[SetBool_Request, SetBool_Response])
+    client = talker.create_client(SetBool, "set")
+    assert_type(client, Client[SetBool_Request, SetBool_Response])
+    assert_type(client.call(SetBool.Request(data=True)), SetBool_Response | None)
+    server = ActionServer(talker, Fibonacci, "fibonacci", execute)
+    assert_type(server, ActionServer[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback])
+    ActionClient(talker, Fibonacci, "fibonacci").send_goal_async(Fibonacci.Goal(order=1))
 
 
 def check_functions(node: rclpy.node.Node, mixed: NodeMixin) -> None:
