@@ -19,14 +19,29 @@ if TYPE_CHECKING:
     class RosForm(Protocol):
         """`builtin_interfaces/msg/Time` or `Duration`: a protobuf message, or one of ROS."""
 
-        sec: int
-        nanosec: int
+        @property
+        def sec(self) -> int: ...
+
+        @property
+        def nanosec(self) -> int: ...
 
     class GoogleForm(Protocol):
         """`google.protobuf.Timestamp` or `Duration`."""
 
-        seconds: int
-        nanos: int
+        @property
+        def seconds(self) -> int: ...
+
+        @property
+        def nanos(self) -> int: ...
+
+    class RclpyTime(Protocol):
+        """`rclpy.time.Time`."""
+
+        @property
+        def nanoseconds(self) -> int: ...
+
+        @property
+        def clock_type(self) -> Any: ...
 
     class RclpyDuration(Protocol):
         """`rclpy.duration.Duration`."""
@@ -34,11 +49,7 @@ if TYPE_CHECKING:
         @property
         def nanoseconds(self) -> int: ...
 
-    class RclpyTime(RclpyDuration, Protocol):
-        """`rclpy.time.Time`."""
-
-        @property
-        def clock_type(self) -> Any: ...
+        def get_c_duration(self) -> Any: ...
 
     Time = datetime | RosForm | GoogleForm | RclpyTime | SupportsIndex
     """What can be converted as a time; a number is the nanoseconds since 1970 (UTC)."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta, timezone
 from typing import Any
 
 from rclpy.action.server import CancelResponse, GoalResponse
-from rosidl_proto.std_msgs.msg import Int8, String, StringAdapter
+from rosidl_proto.builtin_interfaces.msg import Duration, Time
+from rosidl_proto.std_msgs.msg import Header, HeaderAdapter, Int8, String, StringAdapter
 from rosidl_proto.std_srvs.srv import (
     SetBool,
     SetBool_Request,
@@ -38,6 +40,12 @@ from rosidl_adapter_proto.ros import (
     create_publisher,
     create_service,
     create_subscription,
+    set_stamp,
+    to_datetime,
+    to_message,
+    to_rclpy_duration,
+    to_rclpy_time,
+    to_timedelta,
 )
 
 
@@ -200,6 +208,33 @@ def act_by_name(node: Node) -> None:
     client.send_goal_async(NestedMessage.Goal())  # error
     client.send_goal_async(Fibonacci.Result())  # error
     ActionClient(node, SetBool, "fibonacci")  # error
+
+
+def make() -> None:
+    HeaderAdapter.new(fram_id="map")  # error
+    HeaderAdapter.new(frame_id=3)  # error
+    HeaderAdapter.new("map")  # error
+    SetBool.request.new(dat=True)  # error
+    Fibonacci.goal.new(ordre=3)  # error
+    header: Header = StringAdapter.new(data="text")  # error
+    print(header)
+
+
+def convert(node: Node) -> None:
+    now = node.get_clock().now()
+    header = Header()
+    Header(stamp=now)  # error
+    Header(stamp=to_message(now, Duration))  # error
+    header.stamp = to_message(now, Time)  # error
+    set_stamp("header", now)  # error
+    set_stamp(header, "now")  # error
+    set_stamp(header, timedelta(seconds=1))  # error
+    to_message(now, String)  # error
+    to_datetime(header)  # error
+    to_datetime(timedelta(seconds=1))  # error
+    to_timedelta(now)  # error
+    to_rclpy_time(String())  # error
+    to_rclpy_duration(datetime.now(timezone.utc))  # error
 
 
 def call(node: Node) -> None:

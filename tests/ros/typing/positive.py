@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta, timezone
 from typing import Any
 
 import rclpy.client
+import rclpy.duration
 import rclpy.lifecycle
 import rclpy.node
 import rclpy.publisher
 import rclpy.service
 import rclpy.subscription
+import rclpy.time
 import std_msgs.msg  # type: ignore[import-untyped]
 import std_srvs.srv  # type: ignore[import-untyped]
 import test_msgs.action  # type: ignore[import-untyped]
+from google.protobuf.timestamp_pb2 import Timestamp
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.subscription import MessageInfo
-from rosidl_proto.std_msgs.msg import String, StringAdapter
+from rosidl_proto.builtin_interfaces.msg import Duration, Time
+from rosidl_proto.std_msgs.msg import Header, HeaderAdapter, String, StringAdapter
 from rosidl_proto.std_srvs.srv import SetBool, SetBool_Request, SetBool_Response, SetBoolAdapter
 from rosidl_proto.test_msgs.action import (
     Fibonacci,
@@ -43,6 +48,13 @@ from rosidl_adapter_proto.ros import (
     create_publisher,
     create_service,
     create_subscription,
+    set_stamp,
+    to_datetime,
+    to_message,
+    to_nanoseconds,
+    to_rclpy_duration,
+    to_rclpy_time,
+    to_timedelta,
 )
 
 
@@ -216,6 +228,24 @@ def check_names_of_services_and_actions(talker: Talker) -> None:
     server = ActionServer(talker, Fibonacci, "fibonacci", execute)
     assert_type(server, ActionServer[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback])
     ActionClient(talker, Fibonacci, "fibonacci").send_goal_async(Fibonacci.Goal(order=1))
+
+
+def check_times(talker: Talker) -> None:
+    now = talker.get_clock().now()
+    header = HeaderAdapter.new(frame_id="map", stamp=to_message(now, Time))
+    assert_type(header, Header)
+    times = (now, now.to_msg(), header.stamp, Timestamp(), datetime.now(timezone.utc), 5)
+    for time in times:
+        set_stamp(header, time)
+    assert_type(to_message(now, Timestamp), Timestamp)
+    assert_type(to_message(header.stamp, Time), Time)
+    assert_type(to_datetime(header.stamp), datetime)
+    assert_type(to_rclpy_time(header.stamp), rclpy.time.Time)
+    assert_type(now - to_rclpy_time(header.stamp, now.clock_type), rclpy.duration.Duration)
+    assert_type(to_timedelta(Duration(sec=1)), timedelta)
+    assert_type(to_rclpy_duration(timedelta(seconds=1)), rclpy.duration.Duration)
+    assert_type(to_message(now - now, Duration), Duration)
+    assert_type(to_nanoseconds(now) + to_nanoseconds(now - now), int)
 
 
 def check_functions(node: rclpy.node.Node, mixed: NodeMixin) -> None:
