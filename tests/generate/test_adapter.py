@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import store_source
+from tests.generate.conftest import Generated
 
 
 def test_constants(things: SimpleNamespace) -> None:
@@ -87,6 +89,19 @@ def test_services_and_actions_have_the_names_of_ros(things: SimpleNamespace) -> 
     assert (go.Goal, go.Result, go.Feedback) == (action.Go_Goal, action.Go_Result, action.Go_Feedback)
     assert action.Go_SendGoal.Request is action.Go_SendGoal_Request
     assert action.Go_GetResult.Response is action.Go_GetResult_Response
+
+
+def test_every_service_and_action_has_the_names_of_ros(ros_install: Generated) -> None:
+    groups = [name for name in ros_install.interfaces if name.namespace != "msg"]
+    assert groups
+    for name in groups:
+        package = importlib.import_module(f"rosidl_proto.{name.package}.{name.namespace}")
+        parts = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}[name.namespace]
+        group = getattr(package, name.name)
+        assert group is ros_install.adapter(name)
+        for part in parts:
+            assert getattr(group, part) is getattr(package, f"{name.name}_{part}")
+            assert getattr(group, part) is getattr(group, part.lower()).custom_type
 
 
 def test_package_exports(things: SimpleNamespace) -> None:
