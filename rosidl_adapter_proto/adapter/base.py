@@ -250,6 +250,9 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
 class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
 
+    Generated classes also go by the name of the service alone, and have the protobuf classes as `Request` and
+    `Response`, as the ROS class has its messages.
+
     Attributes:
         request: Adapter of the request.
         response: Adapter of the response.
@@ -269,6 +272,9 @@ class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
 
 class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
+
+    Generated classes also go by the name of the action alone, and have the protobuf classes as `Goal`, `Result` and
+    `Feedback`, as the ROS class has its messages.
 
     Attributes:
         goal: Adapter of the goal.
