@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from google.protobuf.message import Message
@@ -142,17 +142,29 @@ class TypeAdapter(Generic[CustomT, RosT]):
         return codec.to_cdr(source)
 
     @classmethod
-    def from_cdr(cls, data: Buffer) -> CustomT:
+    def from_cdr(cls, data: Buffer, fields: Iterable[str] | None = None) -> CustomT:
         """Return the protobuf message of a serialized ROS message: plain CDR of either byte order.
+
+        Args:
+            data: The serialized message.
+            fields: Read only these, such as `header.stamp` or, of each point in a sequence, `points.x`; the rest is
+                skipped unread, however large it is, and absent in the protobuf message.
 
         Raises:
             ConversionError: The bytes are not a valid message of the type; with a codec it is a `TranscodeError`.
             RosNotFoundError: There is no codec, and the ROS message class or rclpy cannot be imported.
+            SchemaError: The type has no such field.
+            TypeError: Fields are chosen and there is no codec, or `fields` is one text.
         """
         codec = cls.codec
         if codec is not None:
-            message: CustomT = codec.from_cdr(data)
+            message: CustomT = codec.from_cdr(data) if fields is None else codec.from_cdr(data, fields)
             return message
+        if fields is not None:
+            raise TypeError(
+                f"{name_of(cls)}: only a codec reads chosen fields, and this adapter has none since a conversion was "
+                "written by hand; leave out `fields`"
+            )
         deserialize, ros_class = (
             import_of_ros("rclpy.serialization", cls).deserialize_message,
             cls.ros_message_type,

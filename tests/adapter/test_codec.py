@@ -30,6 +30,15 @@ def test_generated_adapters_have_one_codec(things: SimpleNamespace, part: Any) -
     assert part.to_cdr(things.msg.Part(x=1)) == part.codec.to_cdr(things.msg.Part(x=1))
 
 
+def test_chosen_fields(things: SimpleNamespace, part: Any) -> None:
+    data = part.to_cdr(things.msg.Part(x=1, header={"frame_id": "map"}))
+    assert part.from_cdr(data, fields=["x"]) == things.msg.Part(x=1)
+    assert part.from_cdr(data, ["header.frame_id"]).header.frame_id == "map"
+    with pytest.raises(SchemaError) as caught:
+        part.from_cdr(data, fields=["header.frame"])
+    assert str(caught.value) == "things/msg/Part.header has no field 'frame'; did you mean 'frame_id'?"
+
+
 def test_an_adapter_derived_from_one_in_use(things: SimpleNamespace) -> None:
     part = things.msg.Part(x=1)
     data = things.msg.PartAdapter_.to_cdr(part)
@@ -143,6 +152,15 @@ def test_without_a_codec_messages_go_through_the_conversions(things: SimpleNames
         by_hand.from_cdr(b"\0\1\0\0\7")
     reason = "5 bytes are not a serialized message of this type: "
     assert str(caught.value).startswith(f"{by_hand.__qualname__}: {reason}")
+
+
+def test_without_a_codec_no_fields_can_be_chosen(by_hand: Any) -> None:
+    with pytest.raises(TypeError) as caught:
+        by_hand.from_cdr(b"", fields=["data"])
+    assert str(caught.value) == (
+        f"{by_hand.__qualname__}: only a codec reads chosen fields, and this adapter has none since a conversion was "
+        "written by hand; leave out `fields`"
+    )
 
 
 def test_without_a_codec_rclpy_is_needed(
