@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 from google.protobuf.message import Message
 
 from rosidl_adapter_proto.adapter.lazy import (
+    LazyAttributes,
     find_ros_class,
     import_of_ros,
     lazy,
@@ -50,7 +51,7 @@ class FieldInfo(NamedTuple):
     nested: type[TypeAdapter[Any, Any]] | None = None
 
 
-class TypeAdapter(Generic[CustomT, RosT]):
+class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
     """Converts between a protobuf message and a ROS message (REP-2007, for Python).
 
     Generated classes derive from it; none is ever instantiated.
@@ -147,14 +148,14 @@ class TypeAdapter(Generic[CustomT, RosT]):
 
         Args:
             data: The serialized message.
-            fields: Read only these, such as `header.stamp` or, of each point in a sequence, `points.x`; the rest is
-                skipped unread, however large it is, and absent in the protobuf message.
+            fields: Which fields to read, such as `["header.stamp", "width"]`; the others are skipped and not even
+                looked at. By default all are read.
 
         Raises:
             ConversionError: The bytes are not a valid message of the type; with a codec it is a `TranscodeError`.
             RosNotFoundError: There is no codec, and the ROS message class or rclpy cannot be imported.
             SchemaError: The type has no such field.
-            TypeError: Fields are chosen and there is no codec, or `fields` is one text.
+            TypeError: There is no codec, and only some fields are asked for.
         """
         codec = cls.codec
         if codec is not None:
@@ -162,8 +163,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
             return message
         if fields is not None:
             raise TypeError(
-                f"{name_of(cls)}: only a codec reads chosen fields, and this adapter has none since a conversion was "
-                "written by hand; leave out `fields`"
+                f"{name_of(cls)}: conversions that were written by hand take whole messages; leave `fields` out"
             )
         deserialize, ros_class = (
             import_of_ros("rclpy.serialization", cls).deserialize_message,
@@ -234,7 +234,7 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
     }
 
 
-class ServiceAdapter(Generic[RequestT, ResponseT]):
+class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
 
     Attributes:
@@ -254,7 +254,7 @@ class ServiceAdapter(Generic[RequestT, ResponseT]):
     ros_class: ClassVar[str]
 
 
-class ActionAdapter(Generic[GoalT, ResultT, FeedbackT]):
+class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
 
     Attributes:
