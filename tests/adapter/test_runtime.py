@@ -6,6 +6,7 @@ Conversions, errors and codecs are tested with those of generated adapters, here
 from __future__ import annotations
 
 import gc
+import sys
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -18,6 +19,7 @@ from rosidl_adapter_proto import TypeRegistry, adapter_for
 from rosidl_adapter_proto.adapter import ActionAdapter, ServiceAdapter, TypeAdapter
 from rosidl_adapter_proto.errors import ConversionError, DefinitionError, SchemaError
 from tests.folders import write_package
+from tests.programs import run
 from tests.run_time import check_attributes, made_at_run_time
 
 # One process has only one version of a type in protobuf's default pool: each test has packages of its own.
@@ -118,6 +120,34 @@ def test_registries_have_adapters_of_their_own() -> None:
     assert one.custom_type is other.custom_type
     assert (one.A, one.new().x) == (1, 1.0)
     assert (other.A, other.new().x) == (2, 2.0)
+
+
+ORDERS = """
+import sys
+from importlib import import_module
+from rosidl_adapter_proto import TypeRegistry, adapter_for
+
+order, definitions, python = sys.argv[1:]
+sys.path.insert(0, python)
+registry = TypeRegistry.from_folders(definitions)
+import_generated = lambda: import_module("things_root.things.msg").EverythingAdapter
+make = lambda: adapter_for("things/msg/Everything", registry)
+steps = (import_generated, make) if order == "generated first" else (make, import_generated)
+one, other = (step() for step in steps)
+assert one.custom_type is other.custom_type
+message = one.new(short="abc")
+assert other.from_cdr(one.to_cdr(message)).short == one.from_cdr(other.to_cdr(message)).short == "abc"
+print(other.new(short="abc") == message)
+"""
+
+
+@pytest.mark.parametrize("order", ["generated first", "made first"])
+def test_the_class_is_that_of_generated_code(order: str, generated_things: SimpleNamespace) -> None:
+    folder = generated_things.folder
+    said = run(
+        *(sys.executable, "-c", ORDERS, order, folder.parent / "things", folder / "python"), folder=folder
+    )
+    assert said == "True\n"
 
 
 def test_versions_of_a_type_side_by_side(generated_things: SimpleNamespace) -> None:
