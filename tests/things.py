@@ -61,6 +61,8 @@ float32 LIMIT=inf
         }; };
     """,
     "srv/Set.srv": "int8 a 1\nint8 A=3\n---\nbool ok\n",
+    "srv/Header.srv": "int8 a\n---\n",
+    "srv/HeaderAdapter.srv": "Header header\n---\n",
     "action/Go.action": "int32 order\n---\nint32[] sequence\n---\nfloat32 part\n",
 }
 

@@ -69,14 +69,16 @@ class GroupAdapter:
     """The class that groups the adapters of a service or an action.
 
     Attributes:
+        name: The name of the service or action, by which ROS users know it; here it is the adapter.
         base: `ServiceAdapter` or `ActionAdapter`.
-        parameters: The protobuf classes that the base is parametrized with.
+        custom_types: The protobuf classes that the base is parametrized with, and what each is called in ROS.
         parts: What it has, and the class that each is.
     """
 
+    name: str
     class_name: str
     base: str
-    parameters: tuple[str, ...]
+    custom_types: tuple[tuple[str, str], ...]
     type_name: str
     type_hash: str
     ros_class: str
@@ -137,9 +139,10 @@ def group_adapter(
     """Decide what the class is that groups the adapters of a service or an action of an interface."""
     base, parameters = _GROUPS[next(iter(group))]
     return GroupAdapter(
+        name=name.name,
         class_name=names.adapter(name),
         base=base,
-        parameters=tuple(group[part].name for part in parameters),
+        custom_types=tuple((part.capitalize(), group[part].name) for part in parameters),
         type_name=str(name),
         type_hash=names.catalog.hash(name),
         ros_class=ros_class(name, interface),
