@@ -207,7 +207,7 @@ def test_what_is_wrong(
     assert printed.err == error.format(file=file, folder=folder)
 
 
-@pytest.mark.parametrize("path", ["types/Track.msg", "msg/Track.txt", "srv/Track.msg"])
+@pytest.mark.parametrize("path", ["msg/Track.txt", "types/Track.idl", "msg/deep/Track.idl"])
 def test_what_is_no_definition(
     path: str, build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,8 +215,8 @@ def test_what_is_no_definition(
 
     assert run("parse", build) == 1
     assert capsys.readouterr().err == (
-        f"{folder}/src/track_msgs/{path} is no definition: it has to be msg/<Name>.msg, srv/<Name>.srv or "
-        "action/<Name>.action, or an .idl file in one of these folders\n"
+        f"{folder}/src/track_msgs/{path} is no definition: it has to be a .msg, .srv or .action file, or an .idl "
+        "file in a folder named msg, srv or action\n"
     )
 
 
