@@ -118,6 +118,23 @@ def test_what_happens_to_be_installed(build: Path, folder: Path, monkeypatch: py
     assert made_again(build) == {"std_msgs"}
 
 
+@pytest.mark.parametrize("command", ["check", "generate"])
+def test_a_dependency_that_was_skipped(
+    command: str, build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its fields would be numbered here, and not as its own build will number them."""
+    resource(folder / "ros", "std_msgs").write_bytes(b"")
+
+    assert run(command, build) == 1
+    assert capsys.readouterr().err == (
+        "track_msgs refers to std_msgs, which was built without protobuf types: a warning says why when std_msgs is "
+        "built\n"
+    )
+
+    (folder / "src/track_msgs/msg/Track.msg").write_text("uint32 id\n")
+    assert run(command, build) == 0
+
+
 def test_install(build: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run("generate", build)
     with build.open("a") as arguments:
