@@ -42,6 +42,7 @@ else()
 endif()
 
 file(CONFIGURE OUTPUT "${_proto_output}/settings.cmake" @ONLY CONTENT [[
+cmake_minimum_required(VERSION 3.20)
 set(_proto_package "@_proto_package@")
 set(_proto_strict "@_proto_strict@")
 set(_proto_output "@_proto_output@")

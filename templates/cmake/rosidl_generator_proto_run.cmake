@@ -59,5 +59,6 @@ function(_rosidl_generator_proto_generate)
   else()
     file(REMOVE_RECURSE "${_proto_output}/package" "${_proto_output}/dependencies" "${_proto_output}/stamp")
     file(WRITE "${_proto_output}/skipped/rosidl_proto/${_proto_package}" "")
+    file(WRITE "${_proto_output}/depfile" "")  # ninja asks for one
   endif()
 endfunction()

@@ -296,18 +296,22 @@ def test_what_was_mended_is_served(built: Built) -> None:
     assert len(workspace.made("lock_msgs")) == 4
 
 
-def test_nothing_of_an_earlier_build_is_installed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("generator", ["Unix Makefiles", "Ninja"])
+def test_nothing_of_an_earlier_build_is_installed(generator: str, tmp_path: Path) -> None:
+    if generator == "Ninja" and shutil.which("ninja") is None:
+        pytest.skip("needs ninja")
     workspace = Workspace(tmp_path)
     workspace.write(["good_msgs"])
     for stage in STAGES:
-        assert workspace.run(stage)[0] == 0
+        assert workspace.run(stage, *(["-G", generator] if stage == "configure" else []))[0] == 0
     assert workspace.made("good_msgs")
     shutil.rmtree(workspace.prefix)
 
     (workspace.folder / "ros/share/std_msgs/msg/Header.msg").write_text("no_msgs/No no\n")
-    (workspace.folder / "good_msgs/msg/Track.msg").write_text("std_msgs/Header other\n")
+    (workspace.folder / "good_msgs/msg/Track.msg").touch()
     for stage in STAGES[1:]:
-        assert workspace.run(stage)[0] == 0
+        code, printed = workspace.run(stage)
+        assert (code, printed.count("CMake Warning")) == (0, 1 if stage == "build" else 0), printed
 
     assert workspace.made("good_msgs") == []
     assert workspace.resource("good_msgs") == b""

@@ -395,7 +395,7 @@ def test_folders_and_what_cannot_be_served(workspace: Workspace) -> None:
     whole = {"msg/Whole.msg": "refused_msgs/Part[] parts\nobject_msgs/Shape shape\n"}
     add_package(workspace, "dependent_msgs", whole, "refused_msgs object_msgs")
 
-    output = workspace.build()
+    output = workspace.build("--symlink-install")
 
     assert "rosidl_generator_proto: object_msgs gets protobuf types and adapters" in output
     python = f"python -c '{USE_OBJECTS}'"
@@ -419,5 +419,5 @@ def test_folders_and_what_cannot_be_served(workspace: Workspace) -> None:
     )
 
     lock_file.unlink()
-    assert warning not in workspace.build()
+    assert warning not in workspace.build("--symlink-install")
     workspace.run("python -c 'from rosidl_proto.dependent_msgs.msg import Whole; Whole().parts.add(part=1)'")
