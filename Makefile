@@ -42,7 +42,7 @@ demo: $(VENV)/ready
 
 test: check test-core test-kilted test-jazzy test-colcon test-fuzz
 
-CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/python/*.cpp core/test/*.?pp core/fuzz/*.cpp)
+CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.cpp)
 
 check: $(VENV)/ready
 	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks core

@@ -39,14 +39,14 @@ class Row:
     wanted: str
 
 
-def seconds(*calls: Callable[[], object]) -> list[float]:
+def seconds(*calls: Callable[[], object], turns: int = TURNS) -> list[float]:
     """Return the time that each call takes."""
     timers = [timeit.Timer(call) for call in calls]
     for timer in timers:
         timer.timeit(1)  # what is made at the first use does not count
     numbers = [max(1, int(SECONDS_PER_TURN / (timer.timeit(5) / 5))) for timer in timers]
     best = [float("inf")] * len(timers)
-    for _ in range(TURNS):
+    for _ in range(turns):
         for index, (timer, number) in enumerate(zip(timers, numbers, strict=True)):
             best[index] = min(best[index], timer.timeit(number) / number)
     return best
@@ -181,6 +181,39 @@ def memcpy_rows(message: Any, adapter: Any) -> Iterator[Row]:
     yield Row("Image 1920x1080: protobuf to CDR, times", "memcpy of the message", ours / copy, "<= 1.5")
 
 
+BATCHES = {"Imu": 200_000, "Image": 20}
+BATCH_TURNS = 15
+
+
+def batch_rows(name: str, message: Any, adapter: Any) -> Iterator[Row]:
+    """Yield what batches into one kept buffer save, over single calls and by a second thread."""
+    transcoder = adapter.transcoder
+    data = adapter.codec.to_cdr(adapter.convert_to_custom(message))
+    messages = [bytes(memoryview(data)) for _ in range(BATCHES[name])]
+    protos = [transcoder.cdr_to_proto(each) for each in messages]
+    for way, single, batch, inputs in (
+        ("CDR to protobuf", transcoder.cdr_to_proto, transcoder.cdr_to_proto_batch, messages),
+        ("protobuf to CDR", transcoder.proto_to_cdr, transcoder.proto_to_cdr_batch, protos),
+    ):
+        kept = bytearray(len(batch(inputs).buffer))
+        singles, one, two = seconds(
+            lambda single=single, inputs=inputs: [single(each) for each in inputs],
+            lambda batch=batch, inputs=inputs, kept=kept: batch(inputs, into=kept),
+            lambda batch=batch, inputs=inputs, kept=kept: batch(inputs, threads=2, into=kept),
+            turns=BATCH_TURNS,
+        )
+        work = f"{name}: {way}, batch"
+        yield Row(f"{work} into a kept buffer", "single calls, results kept", singles / one, ">= 1")
+        yield Row(f"{work} on 2 threads", "on 1 thread", one / two, ">= 1.6")
+
+
+def field_rows(name: str, message: Any, adapter: Any, field: str, wanted: str) -> Iterator[Row]:
+    """Yield what reading one small field costs."""
+    codec, data = adapter.codec, adapter.codec.to_cdr(adapter.convert_to_custom(message))
+    chosen, whole = seconds(lambda: codec.from_cdr(data, fields=(field,)), lambda: codec.from_cdr(data))
+    yield Row(f"{name}: only {field}", "all of the message", whole / chosen, wanted)
+
+
 NODES = ("Imu", "LaserScan", "Image")
 SIDES = ("native", "protobuf")
 PROCESSES = 4
@@ -300,6 +333,10 @@ def main() -> None:
             serialization_rows("Imu", imu, ImuAdapter, copy_imu, ">= 30"),
             serialization_rows("LaserScan 720", scan, LaserScanAdapter, copy_laser_scan, ">= 50"),
             memcpy_rows(image, ImageAdapter),
+            batch_rows("Imu", imu, ImuAdapter),
+            batch_rows("Image", image, ImageAdapter),
+            field_rows("LaserScan 720", scan, LaserScanAdapter, "header.stamp", ""),
+            field_rows("Image 1920x1080", image, ImageAdapter, "header.stamp", ">= 50"),
             object_rows("Imu", imu, ImuAdapter, copy_imu),
             object_rows("LaserScan 720", scan, LaserScanAdapter, copy_laser_scan),
             node_rows(Path(folder, "generated/python")),

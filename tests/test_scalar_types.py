@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
+from array import array
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy
 import pytest
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto
 
 from rosidl_adapter_proto import TypeRegistry
+from rosidl_adapter_proto.generate import Options, Request, generate
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.description import described_type, field_type_description
+from rosidl_adapter_proto.interfaces.find import folder_source
 from rosidl_adapter_proto.interfaces.idl import parse_idl
 from rosidl_adapter_proto.interfaces.model import (
     ArrayType,
@@ -144,6 +151,55 @@ def test_values_in_protobuf(row: Scalar, tmp_path: Path) -> None:
         for name, default in defaults.items():
             found = getattr(message, name)
             assert (tuple(found) if isinstance(default, tuple) else found) == default
+
+
+@pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
+def test_generated_adapters(row: Scalar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Generated adapters convert to a ROS message and back, and through CDR if the type has a form there."""
+    package = f"generated_{row.name.replace(' ', '_')}"
+    lines = dict(idl_spellings(replace(row, idl=())))
+    fields = [Field(f"a{number}", field_type) for number, field_type in enumerate(lines)]
+    members = " ".join(
+        line.replace(" a", f" {field.name}") for field, line in zip(fields, lines.values(), strict=True)
+    )
+    text = f"module {package} {{ module msg {{ struct Foo {{ {members} }}; }}; }};"
+    write_package(tmp_path / package, {"msg/Foo.idl": text})
+    catalog = Catalog((folder_source(tmp_path / package),))
+    generate(Request((package,)), catalog, tmp_path / "out", Options(python_root=f"{package}_root"))
+    monkeypatch.syspath_prepend(tmp_path / "out" / "python")
+    generated = importlib.import_module(f"{package}_root.{package}.msg")
+    generated.FooAdapter.ros_message_type = lambda: ros_message(fields)
+
+    for value in EXTREMES[row.family](row):
+        defaults = {
+            field.name: proto_field(
+                replace(
+                    field, default=value if type_parts(field.type).shape is Shape.SINGLE else (value,) * 3
+                )
+            ).default
+            for field in fields
+        }
+        message = generated.Foo(**defaults)
+
+        converted = generated.FooAdapter.convert_to_ros_message(message)
+
+        assert vars(converted).keys() == {field.name for field in fields}
+        assert generated.FooAdapter.convert_to_custom(converted) == message
+        if row.cdr is not None:
+            assert generated.FooAdapter.from_cdr(generated.FooAdapter.to_cdr(message)) == message
+
+
+def ros_message(fields: list[Field]) -> SimpleNamespace:
+    """Return a new ROS message, as far as the adapters look at what is in it before they fill it."""
+    message = SimpleNamespace()
+    for field in fields:
+        shape, element, capacity, _ = type_parts(field.type)
+        assert isinstance(element, Scalar)
+        if element.typecode and shape is Shape.ARRAY:
+            setattr(message, field.name, numpy.zeros(capacity or 0, numpy.dtype(element.typecode)))
+        elif element.typecode and shape is Shape.SEQUENCE:
+            setattr(message, field.name, array(element.typecode))
+    return message
 
 
 @pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)

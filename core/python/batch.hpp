@@ -1,7 +1,7 @@
 // Many messages at once, on several threads, into one piece of memory. This part knows nothing of Python.
 //
-// Threads take blocks of messages. A block is measured, gets its place after the block before it, and is written
-// while it is still in the cache. So where a result lies does not depend on the threads.
+// Threads take blocks of messages. A block is measured, gets its place after the block before it, and is
+// written while it is still in the cache. So where a result lies does not depend on the threads.
 #pragma once
 
 #include <algorithm>
@@ -63,8 +63,8 @@ class Batch {
     block_size_ += message.size;
   }
 
-  // Transcodes all messages, and sets the range in `output` of each result. Returns how many bytes the results
-  // take. If these are more than there are, the output is not complete.
+  // Transcodes all messages, and sets the range in `output` of each result. Returns how many bytes the
+  // results take. If these are more than there are, the output is not complete.
   uint64_t run(size_t threads, Output output, Range* ranges) const {
     std::atomic<size_t> turn{0};  // the block that gets its place next
     uint64_t end = 0;             // of the blocks before it
@@ -82,7 +82,8 @@ class Batch {
     return end;
   }
 
-  // What is wrong with a message that failed: found by doing it again, so that nothing need be kept for the others.
+  // What is wrong with a message that failed: found by doing it again, so that nothing need be kept for the
+  // others.
   Error error(size_t index) const {
     const Input input = messages_[index];
     Error error;
@@ -90,7 +91,8 @@ class Batch {
     uint64_t size = 0;
     if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) return error;
     std::vector<uint8_t> memory(static_cast<size_t>(size));
-    if (Direction::write(plan_, input, scratch, 0, {memory.data(), size}, error)) error.reason = Reason::Changed;
+    if (Direction::write(plan_, input, scratch, 0, {memory.data(), size}, error))
+      error.reason = Reason::Changed;
     return error;
   }
 
@@ -114,9 +116,10 @@ class Batch {
     return total;
   }
 
-  // Moves the ranges to their places, and writes there. A message that turns out to be wrong only now leaves zeros.
-  void write(size_t first, size_t last, Scratch& scratch, const uint64_t* marks, Output output, uint64_t begin,
-             Range* ranges) const {
+  // Moves the ranges to their places, and writes there. A message that turns out to be wrong only now leaves
+  // zeros.
+  void write(size_t first, size_t last, Scratch& scratch, const uint64_t* marks, Output output,
+             uint64_t begin, Range* ranges) const {
     Error error;
     for (size_t i = first; i < last; ++i) {
       if (ranges[i].missing()) continue;

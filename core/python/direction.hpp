@@ -1,5 +1,5 @@
-// The two directions behind one interface. What a direction keeps between measuring and writing can be shared by
-// many messages; a mark says where in it those of one message begin.
+// The two directions behind one interface. What a direction keeps between measuring and writing can be shared
+// by many messages; a mark says where in it those of one message begin.
 #pragma once
 
 #include <rosidl_adapter_proto/transcode.hpp>

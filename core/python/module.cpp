@@ -5,10 +5,9 @@
 
 #include <cstring>
 #include <deque>
+#include <rosidl_adapter_proto/packed_fields.hpp>
 #include <string>
 #include <vector>
-
-#include <rosidl_adapter_proto/packed_fields.hpp>
 
 #include "batch.hpp"
 
@@ -70,7 +69,8 @@ void add_ranges(Input buffer, const Buffer& ranges, Add add) {
     throw nb::type_error("`ranges` must be a contiguous buffer of 64-bit numbers, such as array('Q')");
   const auto* const places = static_cast<const uint8_t*>(view.buf);
   if (view.len % sizeof(Range) != 0)
-    throw nb::value_error("`ranges` has an odd number of places; give each message its first byte and the one after its last");
+    throw nb::value_error(
+        "`ranges` has an odd number of places; give each message its first byte and the one after its last");
   for (Py_ssize_t at = 0; at < view.len; at += sizeof(Range)) {
     Range range;
     std::memcpy(&range, places + at, sizeof range);
@@ -160,7 +160,8 @@ class Transcoder {
       const Buffer buffer(result, PyBUF_WRITABLE);
       const Output output = buffer.output();
       for (size_t i = 0; i < batch.size(); ++i) {
-        if (overlap(batch[i], output)) throw nb::value_error("`into` is memory of the messages; give other memory");
+        if (overlap(batch[i], output))
+          throw nb::value_error("`into` is memory of the messages; give other memory");
       }
       {
         nb::gil_scoped_release release;
@@ -208,8 +209,8 @@ class Transcoder {
   uint64_t size_limit_;
 };
 
-// The two directions from and to message objects. Python would do it in two lines, at twice the cost for small
-// messages.
+// The two directions from and to message objects. Python would do it in two lines, at twice the cost for
+// small messages.
 class Codec {
  public:
   Codec(nb::handle_t<Transcoder> transcoder, nb::object message_class)
@@ -233,7 +234,7 @@ class Codec {
     return transcoder_.transcode<ProtoToCdr>(proto);
   }
 
-  nb::object from_cdr(nb::handle, nb::handle data) const {
+  nb::object from_cdr(nb::handle data) const {
     return call(from_string_, transcoder_.transcode<CdrToProto>(data));
   }
 
@@ -307,8 +308,16 @@ PyObject* codec_to_cdr(PyObject* self, PyObject* message) {
   return called_from_python([&] { return self_as<Codec>(self).to_cdr(self, message); });
 }
 
-PyObject* codec_from_cdr(PyObject* self, PyObject* data) {
-  return called_from_python([&] { return self_as<Codec>(self).from_cdr(self, data); });
+PyObject* codec_from_cdr(PyObject* self, PyObject* const* arguments, Py_ssize_t count, PyObject* names) {
+  return called_from_python([&] {
+    const Codec& codec = self_as<Codec>(self);
+    if (count == 1 && names == nullptr) return codec.from_cdr(arguments[0]);
+    // With chosen fields, or wrong arguments: Python knows better.
+    const nb::object method = nb::handle(self).attr("_from_cdr");
+    nb::object message = nb::steal(PyObject_Vectorcall(method.ptr(), arguments, count, names));
+    if (!message.is_valid()) throw nb::python_error();
+    return message;
+  });
 }
 
 // Methods as CPython itself has them: the cheapest to call, and unlike those of nanobind they have signatures
@@ -324,8 +333,10 @@ PyType_Slot transcoder_slots[] = {{Py_tp_methods, transcoder_methods}, {0, nullp
 PyMethodDef codec_methods[] = {
     {"to_cdr", codec_to_cdr, METH_O,
      "to_cdr($self, message, /)\n--\n\nTurn a protobuf message into a serialized ROS message."},
-    {"from_cdr", codec_from_cdr, METH_O,
-     "from_cdr($self, data, /)\n--\n\nTurn a serialized ROS message into a protobuf message."},
+    {"from_cdr", reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(codec_from_cdr)),
+     METH_FASTCALL | METH_KEYWORDS,
+     "from_cdr($self, data, /, fields=None)\n--\n\n"
+     "Turn a serialized ROS message, or only the chosen fields of it, into a protobuf message."},
     {"__class_getitem__", Py_GenericAlias, METH_O | METH_CLASS, "Codec[MessageT] is Codec."},
     {nullptr, nullptr, 0, nullptr}};
 PyType_Slot codec_slots[] = {{Py_tp_methods, codec_methods}, {0, nullptr}};

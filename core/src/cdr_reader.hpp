@@ -8,6 +8,9 @@
 namespace rosidl_proto {
 namespace {
 
+// `kSwap`: the bytes of numbers are in the other order than here. `kChecked`: what values are is checked,
+// which has happened when writing follows measuring; that nothing lies outside of the input is always
+// checked.
 template <bool kSwap, bool kChecked, class Sink>
 class CdrReader {
   using At = typename Sink::At;

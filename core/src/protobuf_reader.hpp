@@ -54,8 +54,8 @@ class ProtobufNumbers {
       uint64_t index = 0;
       const auto put = [&](uint64_t value, const uint8_t* p) {
         if (index == found_) return input_.fail(Reason::Changed, p);
-        Raw raw;
-        int64_t refused;
+        Raw raw{};
+        int64_t refused = 0;
         if (!F::from_wire(value, &raw, &refused)) {
           input_.fail(Reason::Range, p, static_cast<uint64_t>(refused), static_cast<uint64_t>(field_.op.cdr));
           input_.at_element(static_cast<int64_t>(index));
@@ -210,7 +210,7 @@ class ProtobufReader {
       using F = decltype(form);
       if constexpr (F::kIsNumber) {
         typename F::Raw raw{};
-        int64_t refused;
+        int64_t refused = 0;
         if (kContent && !F::from_wire(slot.value, &raw, &refused)) {
           return fail(Reason::Range, slot.data, static_cast<uint64_t>(refused),
                       static_cast<uint64_t>(field.op.cdr));
@@ -399,7 +399,7 @@ class ProtobufReader {
       using F = decltype(form);
       if constexpr (F::kIsNumber) {
         typename F::Raw raw{};
-        int64_t refused;
+        int64_t refused = 0;
         if (!F::from_wire(value, &raw, &refused)) return false;
         store_little(out, raw);
         return true;

@@ -146,8 +146,6 @@ class Options:
 OPTIONS = tuple(Setting(each.name.replace("_", "-"), **each.metadata) for each in dataclasses.fields(Options))
 """A row for each option, in order."""
 
-OUTPUT_NAME = "generated"
-
 SETTINGS = {
     each.name: each
     for each in (
@@ -156,7 +154,7 @@ SETTINGS = {
             "output",
             Kind.PATH,
             "The folder to write. It holds what the last run made, and nothing older.",
-            default=Path(OUTPUT_NAME),
+            default=Path("generated"),
             short="o",
         ),
         Setting("deps", Kind.FLAG, "Generate the packages that WHAT depends on, too.", default=True),

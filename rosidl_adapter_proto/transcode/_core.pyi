@@ -51,5 +51,5 @@ class Codec(Generic[MessageT]):
     def to_cdr(self, message: MessageT, /) -> bytes:
         """Turn a protobuf message into a serialized ROS message."""
 
-    def from_cdr(self, data: Buffer, /) -> MessageT:
-        """Turn a serialized ROS message into a protobuf message."""
+    def from_cdr(self, data: Buffer, /, fields: Iterable[str] | None = None) -> MessageT:
+        """Turn a serialized ROS message, or only the chosen fields of it, into a protobuf message."""

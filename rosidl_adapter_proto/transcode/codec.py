@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from google.protobuf.descriptor import Descriptor
@@ -25,6 +26,9 @@ MessageT = TypeVar("MessageT", bound=Message)
 
 NOWHERE = 2**64 - 1
 """The place of a message that could not be transcoded: no buffer is so large."""
+
+MAXIMUM_CHOICES = 64
+"""How many choices of fields a codec remembers; a program asks for the same few again and again."""
 
 MAXIMUM_SIZE = 2**31 - 1
 """The largest protobuf message in bytes (https://protobuf.dev/programming-guides/encoding/#size-limit)."""
@@ -83,9 +87,12 @@ class Transcoder(_core.Transcoder):
         descriptor: The protobuf message, with hashed or any other field numbers.
         size_limit: The largest result in bytes; a larger one is an error before memory is taken for it.
         omit_empty_messages: Leave out single nested messages that have no bytes; by default they are present.
+        fields: Read only these from CDR, such as `header.stamp` or, of each point in a sequence, `points.x`; the rest
+            is skipped. Such a transcoder does not write CDR.
 
     Raises:
-        SchemaError: The description and the descriptor do not fit together.
+        SchemaError: The description and the descriptor do not fit together, or the type has no such field.
+        TypeError: `fields` is one text.
     """
 
     def __init__(
@@ -95,8 +102,13 @@ class Transcoder(_core.Transcoder):
         *,
         size_limit: int = MAXIMUM_SIZE,
         omit_empty_messages: bool = False,
+        fields: Iterable[str] | None = None,
     ) -> None:
-        plan = build_plan(type_description, descriptor, omit_empty_messages=omit_empty_messages)
+        if isinstance(fields, str):
+            raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
+        plan = build_plan(
+            type_description, descriptor, omit_empty_messages=omit_empty_messages, fields=fields
+        )
         super().__init__(plan.pack(), plan.type_name, size_limit)
 
     def cdr_to_proto_batch(
@@ -163,6 +175,8 @@ class Codec(_core.Codec[MessageT]):
 
     - `to_cdr(message)` returns a protobuf message as ROS sends it: little-endian CDR with its encapsulation header.
     - `from_cdr(data)` returns the protobuf message of a serialized ROS message: plain CDR of either byte order.
+      `from_cdr(data, fields=["header.stamp", "width"])` reads only these fields, and what is not needed to find them
+      is not looked at: one small field of a large message costs the same as one of a small message.
 
     Both raise `ConversionError` for what is not a valid message of the type; mostly it is a `TranscodeError`, which has
     the place in the bytes as well.
@@ -184,10 +198,19 @@ class Codec(_core.Codec[MessageT]):
         self.transcoder = Transcoder(type_description, descriptor)
         self.message_class = message_class
         self._type_description = type_description
+        self._of_fields = lru_cache(MAXIMUM_CHOICES)(
+            partial(_codec_of_fields, type_description, message_class)
+        )
         super().__init__(self.transcoder, message_class)
 
     def __reduce__(self) -> tuple[type[Codec[MessageT]], tuple[TypeDescription, type[MessageT]]]:
         return type(self), (self._type_description, self.message_class)
+
+    def _from_cdr(self, data: Buffer, /, fields: Iterable[str] | None = None) -> MessageT:
+        """Do `from_cdr` with any arguments."""
+        if fields is None:
+            return self.from_cdr(data)
+        return self._of_fields(fields if isinstance(fields, str) else tuple(fields)).from_cdr(data)
 
     def _refuse(self, message: object) -> NoReturn:
         """Refuse a message of another class."""
@@ -201,3 +224,11 @@ class Codec(_core.Codec[MessageT]):
             f"protobuf does not serialize it ({error}); a message has {MAXIMUM_SIZE} bytes at most, split it"
         )
         raise ConversionError(self.transcoder.type_name, "", reason) from error
+
+
+def _codec_of_fields(
+    type_description: TypeDescription, message_class: type[MessageT], fields: Iterable[str]
+) -> _core.Codec[MessageT]:
+    """Return what reads only some fields of a type."""
+    descriptor: Any = message_class.DESCRIPTOR
+    return _core.Codec(Transcoder(type_description, descriptor, fields=fields), message_class)

@@ -531,6 +531,19 @@ def test_a_broken_definition_leaves_the_output(source: Path, generated: Path) ->
     assert content(generated) == before
 
 
+@pytest.mark.parametrize("others", [0, 20])
+def test_a_name_that_python_cannot_have(others: int, source: Path, generated: Path) -> None:
+    """The error is the same where processes share the work."""
+    before = content(generated)
+    names = ("None", *(f"M{number}" for number in range(others)))
+    write_package(source / "my_msgs", {f"msg/{name}.msg": "bool b\n" for name in names})
+
+    with pytest.raises(SchemaError, match=r"^my_msgs/msg/None: 'None' is a keyword of Python; rename it$"):
+        run(source, generated)
+
+    assert content(generated) == before
+
+
 def test_protoc_fails(source: Path, generated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = content(generated)
     write_package(source / "my_msgs", {"msg/New.msg": "string name\n"})

@@ -84,11 +84,67 @@ def test_other_errors_stay_what_they_are(monkeypatch: pytest.MonkeyPatch, error:
     assert caught.value is error
 
 
+def test_chosen_fields() -> None:
+    codec = Codec(DESCRIPTION, Time)
+    for fields in (["nanos"], ("nanos",), iter(["nanos"]), {"nanos": 1}):
+        assert codec.from_cdr(CDR, fields=fields) == Time(nanos=2)
+    assert codec.from_cdr(CDR, ["seconds", "nanos"]) == Time(seconds=1, nanos=2)
+    assert codec.from_cdr(CDR, fields=None) == codec.from_cdr(CDR, None) == Time(seconds=1, nanos=2)
+
+
+@pytest.mark.parametrize("rest", [b"", b"\xff" * 50])
+def test_the_rest_is_not_read(rest: bytes) -> None:
+    codec = Codec(DESCRIPTION, Time)
+    assert codec.from_cdr(CDR[:12] + rest, fields=["seconds"]) == Time(seconds=1)
+    with pytest.raises(
+        TranscodeError, match=r"^test/msg/Time\.seconds at byte 4: 8 bytes are needed and 7 are left"
+    ):
+        codec.from_cdr(CDR[:11], fields=["seconds"])
+
+
+WRONG_FIELDS: dict[str, tuple[Any, type[Exception], str]] = {
+    "unknown": (["second"], SchemaError, "test/msg/Time has no field 'second'; did you mean 'seconds'?"),
+    "none": (
+        [],
+        SchemaError,
+        "test/msg/Time: no field is chosen; name one, or give no fields for all of them",
+    ),
+    "one text": ("nanos", TypeError, "fields must be a list of names, such as ['nanos'], not a text"),
+    "a number": (5, TypeError, "'int' object is not iterable"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_FIELDS)
+def test_wrong_fields(case: str) -> None:
+    fields, kind, text = WRONG_FIELDS[case]
+    with pytest.raises(kind) as caught:
+        Codec(DESCRIPTION, Time).from_cdr(CDR, fields=fields)
+    assert str(caught.value) == text
+
+
+def test_wrong_arguments() -> None:
+    codec: Any = Codec(DESCRIPTION, Time)
+    for call in (codec.from_cdr, lambda: codec.from_cdr(CDR, field=["nanos"])):
+        with pytest.raises(TypeError, match=r"_from_cdr\(\) (missing 1 required|got an unexpected keyword)"):
+            call()
+
+
+def test_choices_are_remembered_and_forgotten() -> None:
+    """Each is prepared once; many different ones do not take more and more memory."""
+    codec = Codec(DESCRIPTION, Time)
+    for _ in range(3):
+        codec.from_cdr(CDR, fields=["nanos"])
+    assert codec._of_fields.cache_info()[:2] == (2, 1)
+    for count in range(1, 200):
+        codec.from_cdr(CDR, fields=["nanos"] * count)
+    assert codec._of_fields.cache_info().currsize == 64
+
+
 def test_signatures_and_documentation() -> None:
     codec = Codec(DESCRIPTION, Time)
     for method, signature in (
         (codec.to_cdr, "(message, /)"),
-        (codec.from_cdr, "(data, /)"),
+        (codec.from_cdr, "(data, /, fields=None)"),
         (codec.transcoder.cdr_to_proto, "(data, /)"),
         (codec.transcoder.proto_to_cdr, "(data, /)"),
         (Codec.to_cdr, "(self, message, /)"),

@@ -56,14 +56,9 @@ class Writer:
                 return self._values(field, conversion)
 
     def _one_message(self, field: ProtoField, conversion: OneMessage) -> tuple[Lines, Lines]:
-        nested, source, target = (
-            self.adapter_names[conversion.nested],
-            _read("source", field),
-            _read("message", field),
-        )
-        return (f"{nested}.fill_custom({source}, {target})",), (
-            f"{nested}.fill_ros_message({source}, {target})",
-        )
+        nested = self.adapter_names[conversion.nested]
+        arguments = f"({_read('source', field)}, {_read('message', field)})"
+        return (f"{nested}.fill_custom{arguments}",), (f"{nested}.fill_ros_message{arguments}",)
 
     def _one_value(self, field: ProtoField, conversion: OneValue) -> tuple[Lines, Lines]:
         source, value = _read("source", field), conversion.value
