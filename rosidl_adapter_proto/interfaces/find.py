@@ -27,8 +27,10 @@ _PARSERS: dict[str, Callable[[str, TypeName, str], Interface]] = {
     ".idl": parse_idl,
 }
 
-_IGNORE_MARKERS = {"COLCON_IGNORE", "AMENT_IGNORE", "CMakeCache.txt"}
-"""Files that say that a folder has no packages. The last one is in folders that CMake builds in."""
+_IGNORE_MARKERS = {"COLCON_IGNORE", "AMENT_IGNORE"}
+
+_FOREIGN_MARKERS = ("package.xml", "CMakeCache.txt")
+"""Files of folders in a package that are not part of it: other packages, and what CMake builds in."""
 
 _TEST_FOLDERS = {"test", "tests"}
 """Folders of a package whose definitions are only built for its tests."""
@@ -290,9 +292,10 @@ def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
         seen: The real paths that were looked at, since symbolic links may lead back.
     """
     entries = _entries(folder, seen)
+    if not entries:
+        return
     if _has_manifest(folder) or any(each.name in NAMESPACES and each.is_dir() for each in entries):
-        if entries:
-            yield folder
+        yield folder
         return
     for each in entries:
         if each.is_dir() and not each.name.startswith("."):
@@ -301,9 +304,9 @@ def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
 
 def _package_folder_of(file: Path) -> Path | None:
     """Return the package folder that a file is in: the next one with a package.xml, else that of msg, srv or action."""
-    folders = [*file.parents]
-    with_namespace = (each.parent for each in folders if each.name in NAMESPACES)
-    return next((each for each in folders if _has_manifest(each)), None) or next(with_namespace, None)
+    with_manifest = (each for each in file.parents if _has_manifest(each))
+    with_namespace = (each.parent for each in file.parents if each.name in NAMESPACES)
+    return next(with_manifest, None) or next(with_namespace, None)
 
 
 def _has_manifest(folder: Path) -> bool:
@@ -363,8 +366,9 @@ def _files(folder: Path, seen: set[str]) -> Iterator[Path]:
     for each in _entries(folder, seen):
         path = Path(each.path)
         yield path
-        hidden = each.name.startswith(".") or each.name in _TEST_FOLDERS
-        if each.is_dir() and not hidden and not _has_manifest(path):
+        if not each.is_dir() or each.name.startswith(".") or each.name in _TEST_FOLDERS:
+            continue
+        if not any((path / marker).is_file() for marker in _FOREIGN_MARKERS):
             yield from _files(path, seen)
 
 

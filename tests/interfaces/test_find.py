@@ -118,6 +118,7 @@ def error_of(function: object, *arguments: object, **options: object) -> str:
             ["a/msg/A"],
         ),
         ({"a/msg/A.msg": "", "a/build/msg/B.msg": "", "a/build/CMakeCache.txt": ""}, ["a/msg/A"]),
+        ({"a/msg/A.msg": "", "a/CMakeCache.txt": ""}, ["a/msg/A"]),
         ({"a/msg/A.msg": "", "a/msg/old/B.msg": "", "a/msg/old/COLCON_IGNORE": ""}, ["a/msg/A"]),
         # Packages are not looked for in hidden folders, or where colcon does not look either
         ({"a/msg/A.msg": "", ".b/msg/B.msg": ""}, ["a/msg/A"]),
