@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rosidl_adapter_proto.adapter.contract import RESERVED_NAMES
+from rosidl_adapter_proto.adapter.contract import constant_name
 from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines, plain_lines
 from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer
 from rosidl_adapter_proto.generate.targets.python.names import Names
-from rosidl_adapter_proto.interfaces.model import Interface, Message, SequenceType, TypeName, references
-from rosidl_adapter_proto.schema.conversion import message_conversion, ros_class
+from rosidl_adapter_proto.interfaces.model import Interface, TypeName
+from rosidl_adapter_proto.schema.conversion import has_defaults, message_conversion, ros_class
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue
 
 
@@ -103,7 +103,7 @@ def message_adapter(
         ros_class=ros_class(proto.type_name, interface),
         comment=docstring_lines(proto.source.comment),
         constants=tuple(
-            AdapterConstant(_constant_name(each.name), _literal(each.value), plain_lines(each.comment))
+            AdapterConstant(constant_name(each.name), _literal(each.value), plain_lines(each.comment))
             for each in proto.constants
         ),
         packed_numbers=conversion.packed_numbers,
@@ -112,7 +112,7 @@ def message_adapter(
             for each in proto.fields
         ),
         defaults=_defaults(proto),
-        has_defaults=_has_defaults(proto.source, names),
+        has_defaults=has_defaults(proto.source, names.catalog.message),
     )
 
 
@@ -124,11 +124,6 @@ def _field_info(field: ProtoField, adapter_names: Mapping[TypeName, str]) -> str
     while arguments[-1] == 0:
         arguments.pop()
     return ", ".join(map(str, arguments))
-
-
-def _constant_name(name: str) -> str:
-    """Return the attribute of a constant; not one that adapters have already, as an `.idl` may name it."""
-    return f"{name}_" if name in RESERVED_NAMES else name
 
 
 _GROUPS = {
@@ -159,17 +154,6 @@ def _defaults(proto: ProtoMessage) -> str:
     """Return the default values of a message as the Python text of a dictionary, in terms of protobuf."""
     items = [f"{each.name!r}: {_literal(each.default)}" for each in proto.fields if each.default is not None]
     return "{" + ", ".join(items) + "}" if items else ""
-
-
-def _has_defaults(message: Message, names: Names) -> bool:
-    if any(each.default is not None for each in message.fields):
-        return True
-    # A sequence is empty by default, whatever its elements are.
-    return any(
-        _has_defaults(names.catalog.message(name), names)
-        for field, name in references(message)
-        if not isinstance(field.type, SequenceType)
-    )
 
 
 def _literal(value: ProtoValue) -> str:
