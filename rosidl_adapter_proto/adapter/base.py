@@ -250,8 +250,8 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
 class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
 
-    Generated classes also go by the name of the service alone, and have the protobuf classes as `Request` and
-    `Response`, as the ROS class has its messages.
+    Those that are generated or made at run time also have the protobuf classes as `Request` and `Response`, as the ROS
+    class has its messages, and generated ones go by the name of the service alone as well.
 
     Attributes:
         request: Adapter of the request.
@@ -273,8 +273,8 @@ class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
 class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
 
-    Generated classes also go by the name of the action alone, and have the protobuf classes as `Goal`, `Result` and
-    `Feedback`, as the ROS class has its messages.
+    Those that are generated or made at run time also have the protobuf classes as `Goal`, `Result` and `Feedback`, as
+    the ROS class has its messages, and generated ones go by the name of the action alone as well.
 
     Attributes:
         goal: Adapter of the goal.
