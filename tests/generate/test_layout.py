@@ -89,6 +89,8 @@ FORMS: Mapping[str, Form] = {
     ),
     "message": (HEAD, lambda layout, name: layout.statement(f"class {name}(_message.Message):")),
     "part": (CLASS, lambda layout, name: layout.statement(f"goal: type[{name}] = {name}", "    ")),
+    "alias": (CLASS, lambda layout, name: layout.statement(f"Request: typing.TypeAlias = {name}", "    ")),
+    "other name": ("{}\n", lambda layout, name: layout.statement(f"{name} = {name}Adapter")),
     "name": (CLASS, lambda layout, name: layout.assignment("type_name", quoted(name), "    ")),
     "constant": (CLASS, lambda layout, name: layout.assignment(f"{name}: typing.Final", "1.5", "    ")),
     "string": (CLASS, lambda layout, name: layout.assignment("NAME: typing.Final", quoted(name), "    ")),
