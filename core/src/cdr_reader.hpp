@@ -276,7 +276,7 @@ class CdrReader {
   }
 
   // The code units of a wide string need not be text: ROS passes on any of them.
-  bool check_wide(const Operation& op, const CdrUnits<kSwap>& wide) {
+  ROSIDL_PROTO_NO_INLINE bool check_wide(const Operation& op, const CdrUnits<kSwap>& wide) {
     uint32_t all = 0;
     for (uint64_t i = 0; i < wide.count(); ++i) all |= wide[i];
     for (uint64_t i = 0; all > 0xffff && i < wide.count(); ++i) {

@@ -119,11 +119,8 @@ class ProtobufInput {
         if (after == nullptr) fail(Reason::WireVarint, p);
         return after;
       }
-      case WireType::GroupStart: {
-        const uint8_t* const after = skip_group(p, end, group_);
-        if (after == nullptr) fail(Reason::WireGroup, p, group_);
-        return after;
-      }
+      case WireType::GroupStart:
+        return rest_of_group(p, end);
       case WireType::Delimited:
       case WireType::GroupEnd: {  // `tag` lets none through
         const uint8_t* const after = get_varint(p, end, &size);
@@ -248,6 +245,12 @@ class ProtobufInput {
   };
 
  private:
+  ROSIDL_PROTO_NO_INLINE const uint8_t* rest_of_group(const uint8_t* p, const uint8_t* end) {
+    const uint8_t* const after = skip_group(p, end, group_);
+    if (after == nullptr) fail(Reason::WireGroup, p, group_);
+    return after;
+  }
+
   // A field that is not there has no place: then the error names that of its message.
   uint64_t offset(const uint8_t* p) const {
     const auto at = reinterpret_cast<uintptr_t>(p);

@@ -315,7 +315,7 @@ class ProtobufReader {
     return Sink::failed(inner) ? inner : take(sink_.end(op, at, nested, inner));
   }
 
-  At not_a_character(const ProtobufField& field, uint64_t index) {
+  ROSIDL_PROTO_NO_INLINE At not_a_character(const ProtobufField& field, uint64_t index) {
     const uint8_t* const p = field.slot.data + index;
     uint32_t code_point;
     if (next_code_point(p, field.slot.data + field.slot.value, &code_point) == nullptr)
