@@ -244,8 +244,6 @@ def _proto_field(field: Field, number: int) -> ProtoField:
 
 
 def _limits(scalar: Scalar) -> tuple[int, int] | None:
-    if scalar.family is Family.CHARACTER:
-        return 0, scalar.largest_character
     if scalar.bits and scalar.bits < _PROTOBUF_INTEGER_BITS:
         return scalar.range
     return None

@@ -762,7 +762,7 @@ ERRORS = [
      "  const char A = '\\xq';",
      "                 ^"),
     (foo(before="const char A = L'\\u20AC';"),
-     "Foo.idl:3:16: constant 'A': 8364 does not fit char: use a whole number from 0 to 255",
+     "Foo.idl:3:16: constant 'A': 8364 does not fit char: use a whole number from 0 to 127",
      "  const char A = L'\\u20AC';",
      "                 ^"),
     (foo(before="const long A = 08;"),
