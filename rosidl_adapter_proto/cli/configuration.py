@@ -23,5 +23,12 @@ class ConfiguredGroup(click.Group):
             values = {
                 _ARGUMENTS.get(name, name.replace("-", "_")): each for name, each in found.values.items()
             }
-            context.default_map = dict.fromkeys(self.commands, values)
+            context.default_map = _defaults(self, values)
         return super().invoke(context)
+
+
+def _defaults(command: click.Command, values: dict[str, Any]) -> dict[str, Any]:
+    """Return what click looks up for a command: its values, or those of each command in a group."""
+    if not isinstance(command, click.Group):
+        return values
+    return {name: _defaults(each, values) for name, each in command.commands.items()}

@@ -21,7 +21,13 @@ from pathlib import Path
 from types import FrameType
 
 from rosidl_adapter_proto.errors import GenerateError
-from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, digest, read_manifest
+from rosidl_adapter_proto.generate.manifest import (
+    MANIFEST_NAME,
+    Manifest,
+    SequentialNumbers,
+    digest,
+    read_manifest,
+)
 from rosidl_adapter_proto.interfaces.model import TypeName
 
 if sys.platform != "win32":
@@ -78,11 +84,15 @@ def _has_files(output: Path) -> bool:
     )
 
 
-def make_manifest(fingerprint: str, interfaces: Iterable[TypeName], files: Mapping[str, bytes]) -> Manifest:
+def make_manifest(
+    fingerprint: str,
+    interfaces: Iterable[TypeName],
+    files: Mapping[str, bytes],
+    numbers: SequentialNumbers | None = None,
+) -> Manifest:
     """Return the manifest of a folder that holds `files`."""
-    return Manifest(
-        fingerprint, tuple(interfaces), {path: digest(content) for path, content in sorted(files.items())}
-    )
+    outputs = {path: digest(content) for path, content in sorted(files.items())}
+    return Manifest(fingerprint, tuple(interfaces), outputs, numbers)
 
 
 def changes(output: Path, files: Mapping[str, bytes]) -> Changes:
@@ -126,7 +136,8 @@ def write(output: Path, manifest: Manifest, files: Mapping[str, bytes]) -> Chang
                 _make_folder(folder, cleanup)
                 if not os.access(folder, os.W_OK):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
-            both = Manifest("", (), {**(old.outputs if old else {}), **manifest.outputs})
+            outputs = {**(old.outputs if old else {}), **manifest.outputs}
+            both = Manifest("", (), outputs, manifest.numbers)
             moves = [(MANIFEST_NAME, both.to_json())]
             moves += [(path, files[path]) for path in planned.written]
             moves += [(MANIFEST_NAME, manifest.to_json())]

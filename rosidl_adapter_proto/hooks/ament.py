@@ -21,6 +21,7 @@ from typing import Any
 import rosidl_adapter_proto
 from rosidl_adapter_proto.errors import Error, GenerateError
 from rosidl_adapter_proto.generate import Options, Request, check_definitions, generate
+from rosidl_adapter_proto.generate.lock import is_kept
 from rosidl_adapter_proto.generate.manifest import read_manifest
 from rosidl_adapter_proto.generate.output_tree import install
 from rosidl_adapter_proto.generate.outputs import places
@@ -131,14 +132,16 @@ def generate_package(build: Build) -> None:
     """
     catalog = build.catalog()
     own = Request((build.package,), dependencies=False)
-    result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options)
+    renumber = is_kept(build.options)
+    result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options, renumber=renumber)
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
     needed = {name.package for name in result.interfaces} - {build.package}
     missing = tuple(sorted(needed - _provided(build, catalog)))
     folder = build.output / DEPENDENCIES_FOLDER
     if missing or read_manifest(folder) is not None:
-        generate(Request(missing, dependencies=False), catalog, folder, build.options)
+        others = Request(missing, dependencies=False)
+        generate(others, catalog, folder, build.options, renumber=renumber)
     _write_depfile(build)
 
 

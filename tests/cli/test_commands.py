@@ -173,6 +173,7 @@ def test_every_command_is_listed(run: Run) -> None:
         "generate",
         "hook",
         "list",
+        "lock",
         "show",
     ]
 
