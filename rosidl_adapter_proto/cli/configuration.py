@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.configuration import find_configuration
 
 _ARGUMENTS = {"packages": "what"}
@@ -18,7 +19,13 @@ class ConfiguredGroup(click.Group):
 
     def invoke(self, context: click.Context) -> Any:
         """Give every command the defaults of the configuration, and run the one that was asked for."""
-        found = find_configuration(Path.cwd())
+        try:
+            folder = Path.cwd()
+        except OSError as error:
+            raise RequestError(
+                f"cannot tell the current folder: {error.strerror}; change to one that exists"
+            ) from None
+        found = find_configuration(folder)
         if found is not None:
             values = {
                 _ARGUMENTS.get(name, name.replace("-", "_")): each for name, each in found.values.items()

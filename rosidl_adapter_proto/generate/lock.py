@@ -90,7 +90,7 @@ def is_kept(options: Options) -> bool:
 
     A build then takes what it says, be it that of another branch: the build's folder is nobody's record.
     """
-    return options.numbering == SequentialNumbering.name and options.lock_file.exists()
+    return options.numbering == SequentialNumbering.name and os.path.exists(options.lock_file)
 
 
 def sequential_numbers(
@@ -143,7 +143,7 @@ def check_numbers(
         f"{options.lock_file} has" if lock_exists else f"there is no {options.lock_file}, and a new one has"
     )
     used = Path(os.path.normpath(output / old.numbers.lock_file))
-    if used.exists() and not (lock_exists and used.samefile(options.lock_file)):
+    if os.path.exists(used) and not (lock_exists and used.samefile(options.lock_file)):
         remedy = f"give the lock file that {output} was generated with: --lock-file {used}"
     else:
         remedy = f"restore {options.lock_file} from version control"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import keyword
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosidl_adapter_proto.errors import GenerateError
+from rosidl_adapter_proto.errors import GenerateError, SchemaError
 from rosidl_adapter_proto.generate import protoc
 from rosidl_adapter_proto.generate.fingerprint import fingerprint
 from rosidl_adapter_proto.generate.lock import check_numbers, read_lock, sequential_numbers, write_lock
@@ -165,7 +165,7 @@ def _generate_files(
 
 
 def _proto_files(
-    names: Iterable[TypeName], request: Request, catalog: Catalog, options: Options, numbering: Numbering
+    names: Sequence[TypeName], request: Request, catalog: Catalog, options: Options, numbering: Numbering
 ) -> list[ProtoFile]:
     _check_python_root(options.python_root)
     # What is only referred to is numbered elsewhere. Its numbers make no difference here, and belong into no lock file.
@@ -180,7 +180,24 @@ def _proto_files(
         for name in names
     ]
     check_names(protos)
+    for name in names:
+        _check_length(name)
     return protos
+
+
+def _check_length(name: TypeName) -> None:
+    excess = len(f"{name.name}{_LONGEST_ENDING}") - _LONGEST_FILE_NAME
+    if excess > 0:
+        raise SchemaError(
+            f"{name}: the name is {excess} characters too long for generated files, whose names have at most "
+            f"{_LONGEST_FILE_NAME}, {_LONGEST_ENDING!r} included; shorten it"
+        )
+
+
+_LONGEST_FILE_NAME = 255
+"""What file systems take."""
+_LONGEST_ENDING = "_adapter.py"
+"""The longest that the name of an interface gets in the name of a file."""
 
 
 def _check_python_root(name: str) -> None:

@@ -11,6 +11,7 @@ those of a ROS that came as binaries. `install` installs these.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -170,9 +171,12 @@ def _write_depfile(build: Build) -> None:
     if build.options.numbering == SequentialNumbering.name:
         needs.append(build.options.lock_file)
     stamp = build.output / STAMP_FILE
-    target, *files = [str(file).replace(" ", r"\ ") for file in (stamp, *filter(Path.exists, needs))]
-    (build.output / DEPFILE).write_text(f"{target}: " + " \\\n  ".join(files) + "\n", encoding="utf-8")
-    stamp.touch()
+    target, *files = [str(file).replace(" ", r"\ ") for file in (stamp, *filter(os.path.exists, needs))]
+    try:
+        (build.output / DEPFILE).write_text(f"{target}: " + " \\\n  ".join(files) + "\n", encoding="utf-8")
+        stamp.touch()
+    except OSError as error:
+        raise GenerateError(f"cannot write to {build.output}: {error.strerror} ({error.filename})") from None
 
 
 def install_dependencies(build: Build) -> None:

@@ -201,13 +201,13 @@ def prefix_sources() -> list[Source]:
     sources: list[Source] = []
     for prefix in prefixes():
         share = prefix / "share"
-        if not share.is_dir():
+        if not os.path.isdir(share):
             continue
         origin = f"ROS prefix {prefix}"
         packages = {
-            entry.name: package
-            for entry in sorted(os.scandir(share), key=lambda each: each.name)
-            if entry.is_dir() and (package := _read_package(Path(entry.path), entry.name, origin))
+            name: package
+            for name in _folders(share)
+            if (package := _read_package(share / name, name, origin))
         }
         if packages:
             sources.append(Source(origin, packages))
@@ -264,24 +264,28 @@ def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
         seen: The real paths that were looked at, since symbolic links may lead back.
     """
     real_path = os.path.realpath(folder)
-    if real_path in seen or any((folder / marker).exists() for marker in _IGNORE_MARKERS):
+    if real_path in seen or any(os.path.exists(folder / marker) for marker in _IGNORE_MARKERS):
         return
     seen.add(real_path)
-    if (folder / "package.xml").is_file() or any((folder / namespace).is_dir() for namespace in NAMESPACES):
+    if os.path.isfile(folder / "package.xml") or any(os.path.isdir(folder / each) for each in NAMESPACES):
         yield folder
         return
-    try:
-        children = sorted(entry.name for entry in os.scandir(folder) if entry.is_dir())
-    except OSError as error:
-        raise _unreadable(folder, error) from None
-    for child in children:
+    for child in _folders(folder):
         if not child.startswith("."):
             yield from _package_folders(folder / child, seen)
 
 
+def _folders(folder: Path) -> list[str]:
+    """Return the names of the folders in a folder. A link that leads nowhere, or in a circle, is none."""
+    try:
+        return sorted(entry.name for entry in os.scandir(folder) if os.path.isdir(entry))
+    except OSError as error:
+        raise _unreadable(folder, error) from None
+
+
 def _package_name(folder: Path) -> str:
     manifest = folder / "package.xml"
-    if not manifest.is_file():
+    if not os.path.isfile(manifest):
         return folder.resolve().name
     try:
         name = (ElementTree.parse(manifest).getroot().findtext("name") or "").strip()
