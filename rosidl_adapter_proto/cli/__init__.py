@@ -7,6 +7,7 @@ fault); 130 interrupted.
 
 from __future__ import annotations
 
+import errno
 import importlib
 import io
 import pkgutil
@@ -61,6 +62,11 @@ def main(arguments: list[str] | None = None) -> None:
             traceback.print_exc()
         if isinstance(error, Error):
             click.echo(f"Error: {error}", err=True)
+        elif isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
+            # Whatever writes files says which one; what is printed has no name.
+            click.echo(
+                f"Error: cannot write to the standard output: {error.strerror}; make room there", err=True
+            )
         else:
             click.echo(f"Internal error: {error!r}; --debug shows where it comes from", err=True)
         sys.exit(EXIT_USAGE if isinstance(error, RequestError) else EXIT_FAILED)

@@ -184,6 +184,7 @@ def test_every_command_is_listed(run: Run) -> None:
         "generate",
         "hook",
         "list",
+        "lock",
         "show",
     ]
 

@@ -176,6 +176,41 @@ def test_a_link_in_the_place_of_ours_is_replaced_not_followed(output: Path, tmp_
     assert (tmp_path / "target").read_bytes() == b"mine"
 
 
+@pytest.mark.parametrize("files", [NEW, OLD, {}], ids=["new", "same", "none"])
+def test_nothing_is_changed_behind_a_link(files: dict[str, bytes], output: Path, tmp_path: Path) -> None:
+    """A folder of ours that somebody replaced by a link: what is there is theirs, even if it has our names."""
+    theirs = tmp_path / "theirs"
+    (output / "proto" / "q").rename(theirs)
+    (theirs / "r" / "c").write_bytes(b"theirs")
+    link = output / "proto" / "q"
+    link.symlink_to(theirs)
+    before = content(tmp_path)
+
+    for attempt in (changes, put):
+        with pytest.raises(GenerateError) as error:
+            attempt(output, files)
+
+        assert str(error.value) == (
+            f"{link} is a symbolic link, and rosidl-proto changes nothing outside {output}; "
+            "remove the link, or choose another folder with --output"
+        )
+        assert content(tmp_path) == before
+    link.unlink()
+    put(output, files)
+    assert files_in(output) == files
+
+
+def test_what_python_cached_behind_a_link_stays(tmp_path: Path) -> None:
+    output = tmp_path / "out"
+    put(output, {"a/m.py": b""})
+    make_file(tmp_path / "theirs" / "m.cpython-311.pyc")
+    (output / "a" / "__pycache__").symlink_to(tmp_path / "theirs")
+
+    put(output, {})
+
+    assert content(tmp_path / "theirs") == {"m.cpython-311.pyc": b"mine"}
+
+
 def test_the_output_folder_may_be_a_link(output: Path, tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(output)

@@ -160,7 +160,7 @@ def test_what_changes_the_output_is_noticed(option: Setting, folder: Path) -> No
     generate(request, catalog, folder / "out")
     options = set_to(option, other(option))
 
-    result = generate(request, catalog, folder / "out", options, check=True)
+    result = generate(request, catalog, folder / "out", options, check=True, renumber=True)
 
     assert result.is_stale == option.changes_output
     package = generated_packages(catalog.packages["my_msgs"], catalog, options)["my_msgs"]

@@ -279,7 +279,7 @@ def test_options(workspace: Workspace) -> None:
     assert lock_file.read_bytes() == before
 
     # As by a change of the lock file that comes from somebody else.
-    lock_file.write_bytes(before.replace(b'"2 fixed32"', b'"9 fixed32"'))
+    lock_file.write_bytes(before.replace(b'"2 fixed32 ', b'"9 fixed32 '))
     workspace.build()
     proto = workspace.folder / "install/track_msgs/share/track_msgs/msg/Track.proto"
     assert "fixed32 id = 9;" in proto.read_text(encoding="utf-8")

@@ -256,7 +256,7 @@ def test_numbers_of_a_lock_file(tmp_path: Path) -> None:
     assert numbers(registry["registry_lock/msg/A"]) == {"a": 3, "b": 2, "new": 4}
     assert numbers(registry["registry_lock/msg/B"]) == {"x": 1, "y": 2}
     assert lock.read_text() == numbering.lock_text()
-    with pytest.raises(SchemaError, match=r"^registry_lock/msg/A\.a: .* has number 3 for it with type int32"):
+    with pytest.raises(SchemaError, match=r"^registry_lock/msg/A\.a: .* has number 3 for it with type int8"):
         TypeRegistry.from_texts({"registry_lock/msg/A": "string a"}, lock_file=lock)["registry_lock/msg/A"]
 
 
