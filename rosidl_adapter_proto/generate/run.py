@@ -108,7 +108,10 @@ def generate(
         if new_lock_text is not None and new_lock_text != lock_text:
             _write_lock(options, lock_text, new_lock_text)
         changed = write(output, manifest, files)
-    return Result(tuple(names), changed, new_lock_text != lock_text, _warnings(catalog, names))
+    # An unchanged run does not repeat them, since it parses nothing.
+    of_definitions = tuple(each for name in names for each in catalog.definition(name).interface.warnings)
+    warnings = (*of_definitions, *_warnings(catalog, names))
+    return Result(tuple(names), changed, new_lock_text != lock_text, warnings)
 
 
 def check_definitions(request: Request, catalog: Catalog, options: Options = Options()) -> list[TypeName]:

@@ -32,7 +32,7 @@ from rosidl_adapter_proto.interfaces.model import (
     ValueType,
     value_type,
 )
-from rosidl_adapter_proto.interfaces.problem import problem
+from rosidl_adapter_proto.interfaces.problem import problem, wide_string_warning
 from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
 
 _PRIMITIVE_TYPES = {name: row for row in SCALARS.values() for name in row.msg}
@@ -93,13 +93,14 @@ def parse_msg(text: str, name: TypeName, file: str, *, ros1_names: bool = False)
 def parse_srv(text: str, name: TypeName, file: str) -> Service:
     """Read a `.srv` definition; arguments and errors are those of `parse_msg`."""
     request, response = _parse_sections(text, name, file, ("_Request", "_Response"))
-    return Service(name, request, response, text)
+    return Service(name, request, response, text, (*request.warnings, *response.warnings))
 
 
 def parse_action(text: str, name: TypeName, file: str) -> Action:
     """Read an `.action` definition; arguments and errors are those of `parse_msg`."""
     goal, result, feedback = _parse_sections(text, name, file, ("_Goal", "_Result", "_Feedback"))
-    return Action(name, goal, result, feedback, text)
+    warnings = (*goal.warnings, *result.warnings, *feedback.warnings)
+    return Action(name, goal, result, feedback, text, warnings)
 
 
 def _parse_sections(text: str, name: TypeName, file: str, suffixes: tuple[str, ...]) -> list[Message]:
@@ -144,6 +145,7 @@ class _MessageReader:
         self.file = file
         self.lines = text.splitlines()
         self.ros1_names = ros1_names
+        self.warnings: list[str] = []
 
     def read(self, start: int, end: int, text: str = "") -> Message:
         """Read the lines from `start` up to `end`, counted from 0."""
@@ -186,7 +188,15 @@ class _MessageReader:
             message_comment += ["", *pending]
         if not fields:
             fields.append(Field(EMPTY_STRUCT_FIELD, BasicType("uint8")))
-        return Message(self.name, tuple(fields), tuple(constants), _tidy(message_comment), (), text)
+        return Message(
+            self.name,
+            tuple(fields),
+            tuple(constants),
+            _tidy(message_comment),
+            (),
+            text,
+            tuple(self.warnings),
+        )
 
     def _element(self, code: str, number: int) -> Field | Constant:
         """Read a field or constant from a line without its comment."""
@@ -248,9 +258,19 @@ class _MessageReader:
         if size_text is None:
             return element
         if not size_text and not match["upper_bound"]:
-            return SequenceType(element)
+            return SequenceType(element, self._bound_as_in_ros(element, location))
         size = self._positive(size_text, f"the size of array type {text!r}", location)
         return SequenceType(element, size) if match["upper_bound"] else ArrayType(element, size)
+
+    def _bound_as_in_ros(self, element: ValueType, location: Location) -> int | None:
+        """Return the bound of a sequence without one: `rosidl_parser` gives it that of its wide strings, by mistake.
+
+        It is what is installed and hashed.
+        """
+        if not isinstance(element, StringType) or not element.wide or element.bound is None:
+            return None
+        self.warnings.append(f"{location}: {wide_string_warning(element.bound)}")
+        return element.bound
 
     def _value_type(self, text: str, location: Location) -> ValueType:
         base, is_bounded, bound_text = text.partition("<=")

@@ -651,3 +651,14 @@ def test_same_bytes_everywhere(seed: str, source: Path, generated: Path, tmp_pat
     )
 
     assert content(elsewhere / "cwd" / "out") == content(generated)
+
+
+def test_warnings_of_definitions(source: Path, output: Path) -> None:
+    file = source / "base_msgs" / "msg" / "Wide.msg"
+    file.write_text("wstring<=5[] x\n")
+    expected = (
+        f"{file}:1:1: ROS 2 takes the bound of these wide strings for that of the sequence too, and so it is "
+        "generated: at most 5 elements; give the sequence a bound of its own",
+    )
+    assert run(source, output).warnings == expected
+    assert run(source, output).warnings == ()  # a run with nothing to do parses nothing

@@ -129,6 +129,9 @@ FIELDS: list[tuple[str, Field]] = [
             "string<=5[]": SequenceType(StringType(bound=5)),
             "string<=5[2]": ArrayType(StringType(bound=5), 2),
             "wstring<=5[<=2]": SequenceType(StringType(True, 5), 2),
+            "wstring<=5[]": SequenceType(StringType(True, 5), 5),
+            "wstring<=5[2]": ArrayType(StringType(True, 5), 2),
+            "wstring[]": SequenceType(WSTRING),
             "Bar[2]": ArrayType(TypeName("pkg", "msg", "Bar"), 2),
             "other/Bar[<=2]": SequenceType(TypeName("other", "msg", "Bar"), 2),
         }.items()
@@ -365,6 +368,19 @@ def test_layouts(
     theirs = official(text, FOO, tmp_path)
     assert theirs is not None
     assert facts(message) == facts(theirs)
+
+
+@pytest.mark.parametrize("name", [FOO, DO, GO], ids=str)
+def test_a_sequence_of_bounded_wide_strings_has_their_bound_and_a_warning(name: TypeName) -> None:
+    text = "\n---\n".join(["wstring<=5[] x", "wstring<=6[<=2] x", "string<=5[] x"][: len(parts_of(name))])
+    assert parse(text, name).warnings == (
+        f"{name.name}.{name.namespace}:1:1: ROS 2 takes the bound of these wide strings for that of the sequence "
+        "too, and so it is generated: at most 5 elements; give the sequence a bound of its own",
+    )
+
+
+def parts_of(name: TypeName) -> range:
+    return range({"msg": 1, "srv": 2, "action": 3}[name.namespace])
 
 
 def test_locations() -> None:
