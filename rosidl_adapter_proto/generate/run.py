@@ -35,7 +35,7 @@ from rosidl_adapter_proto.schema.numbering import (
     Numbering,
     SequentialNumbering,
 )
-from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, proto_file
+from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, check_nesting, proto_file
 
 
 @dataclass(frozen=True)
@@ -174,6 +174,7 @@ def _proto_files(
         for name in names
     ]
     check_names(protos)
+    check_nesting(protos)
     return protos
 
 

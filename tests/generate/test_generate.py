@@ -662,3 +662,29 @@ def test_warnings_of_definitions(source: Path, output: Path) -> None:
     )
     assert run(source, output).warnings == expected
     assert run(source, output).warnings == ()  # a run with nothing to do parses nothing
+
+
+@pytest.mark.parametrize("length", [101, 400])
+def test_messages_that_are_nested_too_deep(length: int, tmp_path: Path, output: Path) -> None:
+    definitions = {f"msg/D{each}.msg": f"D{each + 1} x\n" for each in range(length - 1)}
+    source = write_package(tmp_path / "deep_msgs", {**definitions, f"msg/D{length - 1}.msg": "int8 x\n"})
+    outer, inner = f"D{length - 101}", f"D{length - 100}"
+    with pytest.raises(SchemaError) as caught:
+        run(source, output, ["deep_msgs"])
+    assert str(caught.value) == (
+        f"deep_msgs/msg/{outer}.x ({source}/msg/{outer}.msg:1:{len(inner) + 2}) nests messages more than 100 deep, "
+        f"which protobuf does not read; flatten deep_msgs/msg/{inner} or what is in it"
+    )
+    assert not output.exists()
+
+
+def test_control_characters_in_comments(tmp_path: Path, output: Path) -> None:
+    text = "# a\0b\n\nint8 x # \0\x1b\x7f [\x01]\nint8 Y=1 # \0\n"
+    source = write_package(tmp_path / "odd_msgs", {"msg/Odd.msg": text})
+    run(source, output, ["odd_msgs"])
+    texts = {path.suffix: path.read_text() for path in output.rglob("Odd*.p*") if path.name[-7:] != "_pb2.py"}
+    assert texts.keys() == {".proto", ".pyi", ".py"}
+    for each in texts.values():
+        assert "a␀b" in each
+        assert not set(each) & set(map(chr, (*range(9), *range(14, 32), 127)))
+    assert "␀␛␡" in texts[".proto"]

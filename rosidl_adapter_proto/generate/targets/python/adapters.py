@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.adapter.contract import constant_name
-from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines, plain_lines
+from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines
 from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer, method
 from rosidl_adapter_proto.generate.targets.python.names import Names
 from rosidl_adapter_proto.interfaces.model import Interface, Message, SequenceType, TypeName, references
 from rosidl_adapter_proto.schema.conversion import message_conversion, ros_class
-from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue
+from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue, plain_lines
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def message_adapter(
         comment=docstring_lines(proto.source.comment),
         constants=tuple(
             AdapterConstant(
-                constant_name(each.name, proto.name), _literal(each.value), plain_lines(each.comment)
+                constant_name(each.name, proto.name), _literal(each.value), tuple(plain_lines(each.comment))
             )
             for each in proto.constants
         ),
