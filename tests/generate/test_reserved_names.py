@@ -8,7 +8,7 @@ import importlib
 import keyword
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from google.protobuf.empty_pb2 import Empty
 
-from rosidl_adapter_proto import adapter
+from rosidl_adapter_proto import TypeRegistry, adapter, adapter_for
 from rosidl_adapter_proto.adapter.contract import (
     PROTOBUF_NAMES,
     RESERVED_IN_BODIES,
@@ -79,6 +79,15 @@ DEFINITIONS = {
 }
 
 
+@pytest.fixture(scope="module", params=["generated", "at run time"])
+def adapter_of(reserved: SimpleNamespace, request: pytest.FixtureRequest) -> Callable[[str], Any]:
+    """What gives the adapter of a message of `DEFINITIONS`."""
+    if request.param == "generated":
+        return lambda name: getattr(reserved.msg, f"{name}Adapter")
+    registry = TypeRegistry.from_folders(reserved.folder.parent / "reserved_msgs")
+    return lambda name: adapter_for(f"reserved_msgs/msg/{name}", registry)
+
+
 @pytest.fixture(scope="module")
 def reserved(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
     """The messages of `DEFINITIONS`, generated and imported."""
@@ -103,11 +112,12 @@ def test_constants_keep_apart() -> None:
     assert not {*called} & (RESERVED_NAMES | RESERVED_IN_BODIES)
 
 
-def test_constants(reserved: SimpleNamespace) -> None:
+def test_constants(adapter_of: Callable[[str], Any]) -> None:
+    constants = adapter_of("Constants")
     for number, name in enumerate(NAMES):
-        assert getattr(reserved.msg.ConstantsAdapter, constant_name(name, "Constants")) == number, name
-    message = reserved.msg.Constants(x=1)
-    assert reserved.msg.ConstantsAdapter.from_cdr(reserved.msg.ConstantsAdapter.to_cdr(message)) == message
+        assert getattr(constants, constant_name(name, "Constants")) == number, name
+    message = constants.custom_type(x=1)
+    assert constants.from_cdr(constants.to_cdr(message)) == message
 
 
 VALUES: dict[str, Any] = {
@@ -123,8 +133,8 @@ BLANKS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("kind", VALUES)
-def test_fields(kind: str, reserved: SimpleNamespace) -> None:
-    types: Any = getattr(reserved.msg, f"{kind}Adapter")
+def test_fields(kind: str, adapter_of: Callable[[str], Any]) -> None:
+    types = adapter_of(kind)
     source = SimpleNamespace(**{name: VALUES[kind](number) for number, name in enumerate(NAMES)})
     message = types.convert_to_custom(source)
     other = types.convert_to_custom(source, types.custom_type())
@@ -134,8 +144,8 @@ def test_fields(kind: str, reserved: SimpleNamespace) -> None:
     assert message == other == types.from_cdr(types.to_cdr(message))
 
 
-def test_default_values(reserved: SimpleNamespace) -> None:
-    fields, nested = reserved.msg.FieldsAdapter.new(), reserved.msg.NestedAdapter.new()
+def test_default_values(adapter_of: Callable[[str], Any]) -> None:
+    fields, nested = adapter_of("Fields").new(), adapter_of("Nested").new()
     assert [getattr(fields, name) for name in NAMES] == [7] * len(NAMES)
     assert [getattr(nested, name).x for name in NAMES] == [3] * len(NAMES)
 

@@ -10,8 +10,8 @@ from rosidl_adapter_proto.adapter.contract import constant_name
 from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines
 from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer, method
 from rosidl_adapter_proto.generate.targets.python.names import Names
-from rosidl_adapter_proto.interfaces.model import Interface, Message, SequenceType, TypeName, references
-from rosidl_adapter_proto.schema.conversion import message_conversion, ros_class
+from rosidl_adapter_proto.interfaces.model import Interface, TypeName
+from rosidl_adapter_proto.schema.conversion import has_defaults, message_conversion, ros_class
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue, plain_lines
 
 
@@ -74,14 +74,16 @@ class GroupAdapter:
     """The class that groups the adapters of a service or an action.
 
     Attributes:
+        name: The name of the service or action, by which ROS users know it; here it is the adapter.
         base: `ServiceAdapter` or `ActionAdapter`.
-        parameters: The protobuf classes that the base is parametrized with.
+        custom_types: The protobuf classes that the base is parametrized with, and what each is called in ROS.
         parts: What it has, and the class that each is.
     """
 
+    name: str
     class_name: str
     base: str
-    parameters: tuple[str, ...]
+    custom_types: tuple[tuple[str, str], ...]
     type_name: str
     type_hash: str
     ros_class: str
@@ -118,7 +120,7 @@ def message_adapter(
         ),
         set_in_parent=method(proto, "SetInParent"),
         defaults=_defaults(proto),
-        has_defaults=_has_defaults(proto.source, names),
+        has_defaults=has_defaults(proto.source, names.catalog.message),
     )
 
 
@@ -145,9 +147,10 @@ def group_adapter(
     """Decide what the class is that groups the adapters of a service or an action of an interface."""
     base, parameters = _GROUPS[next(iter(group))]
     return GroupAdapter(
+        name=name.name,
         class_name=names.adapter(name),
         base=base,
-        parameters=tuple(group[part].name for part in parameters),
+        custom_types=tuple((part.capitalize(), group[part].name) for part in parameters),
         type_name=str(name),
         type_hash=names.catalog.hash(name),
         ros_class=ros_class(name, interface),
@@ -159,17 +162,6 @@ def _defaults(proto: ProtoMessage) -> str:
     """Return the default values of a message as the Python text of a dictionary, in terms of protobuf."""
     items = [f"{each.name!r}: {_literal(each.default)}" for each in proto.fields if each.default is not None]
     return "{" + ", ".join(items) + "}" if items else ""
-
-
-def _has_defaults(message: Message, names: Names) -> bool:
-    if any(each.default is not None for each in message.fields):
-        return True
-    # A sequence is empty by default, whatever its elements are.
-    return any(
-        _has_defaults(names.catalog.message(name), names)
-        for field, name in references(message)
-        if not isinstance(field.type, SequenceType)
-    )
 
 
 def _literal(value: ProtoValue) -> str:
