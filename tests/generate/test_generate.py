@@ -688,3 +688,25 @@ def test_control_characters_in_comments(tmp_path: Path, output: Path) -> None:
         assert "a␀b" in each
         assert not set(each) & set(map(chr, (*range(9), *range(14, 32), 127)))
     assert "␀␛␡" in texts[".proto"]
+
+
+def test_deep_and_wide_messages(tmp_path: Path, output: Path) -> None:
+    """A chain as long as it may be, and messages that each have the next three times."""
+    deep = {f"msg/D{each}.msg": f"D{each + 1} x\n" for each in range(99)}
+    wide = {f"msg/W{each}.msg": f"W{each + 1} a\nW{each + 1}[2] b\n" for each in range(30)}
+    last = {"msg/D99.msg": "int8 x 5\n", "msg/W30.msg": "int8 x\n"}
+    source = write_package(tmp_path / "large_msgs", {**deep, **wide, **last})
+    run(source, output, ["large_msgs"], options=Options(python_root="large_root"))
+    program = """if True:
+        import sys
+        from large_root.large_msgs.msg import D0Adapter, W0, W0Adapter
+        message = D0Adapter.new()
+        for _ in range(99):
+            message = message.x
+        assert message.x == 5
+        assert W0Adapter.new() == W0()
+        sizes = [len(each.type_description()["referenced_type_descriptions"]) for each in (D0Adapter, W0Adapter)]
+        assert sizes == [99, 30]
+    """
+    environment = {**os.environ, "PYTHONPATH": str(output / "python")}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
