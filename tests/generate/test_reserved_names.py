@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import array
+import ast
 import builtins
 import importlib
 import keyword
@@ -23,9 +24,12 @@ from rosidl_adapter_proto.adapter.contract import (
     RESERVED_NAMES,
     constant_name,
 )
+from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.generate import Options, Request, generate
+from rosidl_adapter_proto.generate.targets.python.names import check_module_names
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import folder_source, store_source
+from rosidl_adapter_proto.interfaces.model import TypeName
 from tests.folders import write_package
 
 OF_MODULES = (
@@ -161,3 +165,50 @@ def test_types(reserved: SimpleNamespace, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mypy", "--config-file", str(config), str(folder)]
     report = subprocess.run(command, capture_output=True, check=False, text=True)
     assert report.returncode == 0, report.stdout
+
+
+def test_interfaces_called_like_what_their_modules_use(tmp_path: Path) -> None:
+    write_package(
+        tmp_path / "odd_msgs",
+        {"msg/numbers.idl": "module odd_msgs { module msg { struct numbers { long a; }; }; };"},
+    )
+    catalog = Catalog((folder_source(tmp_path / "odd_msgs"), store_source()))
+    with pytest.raises(SchemaError) as caught:
+        generate(Request(("odd_msgs",)), catalog, tmp_path / "out", Options())
+    assert str(caught.value) == (
+        "odd_msgs/msg/numbers: generated modules use the name 'numbers' themselves; "
+        "rename the interface, in ROS's style with an upper case letter first"
+    )
+    check_module_names(TypeName("odd_msgs", "msg", "Numbers"))
+
+
+def test_the_names_that_modules_use_are_complete(things: SimpleNamespace) -> None:
+    """Nothing in lower case stands in an adapter module, but what no interface can be called."""
+    used: set[str] = set()
+    for file in things.folder.rglob("*_adapter.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Name):
+                used.add(node.id)
+            elif isinstance(node, ast.arg):
+                used.add(node.arg)
+    used = {name for name in used if name.islower() and name.strip("_") == name} - IN_BODIES
+    assert "numbers" in used
+    for name in used:
+        with pytest.raises(
+            SchemaError, match=f"^things/msg/{name}: generated modules use the name '{name}' "
+        ):
+            check_module_names(TypeName("things", "msg", name))
+
+
+IN_BODIES = {
+    "codec",
+    "custom_type",
+    "defaults",
+    "feedback",
+    "feedback_message",
+    "fields",
+    "get_result",
+    "goal",
+}
+IN_BODIES |= {"has_defaults", "request", "response", "result", "ros_class", "send_goal", "type_hash", "value"}
+"""What has its meaning in a class body or a lambda only, where no interface is used by its name."""
