@@ -255,6 +255,9 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
 class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
 
+    Those that are generated or made at run time also have the protobuf classes as `Request` and `Response`, as the ROS
+    class has its messages, and generated ones go by the name of the service alone as well.
+
     Attributes:
         request: Adapter of the request.
         response: Adapter of the response.
@@ -274,6 +277,9 @@ class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
 
 class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
+
+    Those that are generated or made at run time also have the protobuf classes as `Goal`, `Result` and `Feedback`, as
+    the ROS class has its messages, and generated ones go by the name of the action alone as well.
 
     Attributes:
         goal: Adapter of the goal.

@@ -17,7 +17,7 @@ from rosidl_adapter_proto.adapter.messages import check_custom, finish_custom, f
 from rosidl_adapter_proto.adapter.values import CONVERSION_ERRORS, conversion_error
 from rosidl_adapter_proto.interfaces.description import TypeDescription
 from rosidl_adapter_proto.interfaces.model import Message, TypeName
-from rosidl_adapter_proto.schema.conversion import has_defaults, message_conversion, ros_class
+from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
 from rosidl_adapter_proto.schema.proto import ProtoMessage
 from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
 
@@ -85,7 +85,11 @@ def _innermost_first(description: TypeDescription) -> Iterable[TypeName]:
 
 def _group_adapter(registry: TypeRegistry, schema: Schema) -> Any:
     base = ServiceAdapter if "request" in schema.parts else ActionAdapter
-    return _class(schema, base, {part: _adapter(registry, each) for part, each in schema.parts.items()})
+    parts = {part: _adapter(registry, each) for part, each in schema.parts.items()}
+    custom_types = {
+        NAMED_PARTS[part]: each.custom_type for part, each in parts.items() if part in NAMED_PARTS
+    }
+    return _class(schema, base, {**parts, **custom_types})
 
 
 def _message_adapter(registry: TypeRegistry, schema: Schema, adapters: Mapping[TypeName, Any]) -> Any:

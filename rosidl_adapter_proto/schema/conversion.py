@@ -367,6 +367,16 @@ def _ros_part(name: TypeName, service: Service) -> str:
     return f".{part}" if part else ""
 
 
+NAMED_PARTS = {
+    "request": "Request",
+    "response": "Response",
+    "goal": "Goal",
+    "result": "Result",
+    "feedback": "Feedback",
+}
+"""The parts of services and actions that are messages of the user, and what ROS calls their classes."""
+
+
 def has_defaults(message: Message, find: Callable[[TypeName], Message]) -> bool:
     """Return whether a message or one that is always in it has a default value.
 

@@ -73,11 +73,15 @@ def test_services_and_actions() -> None:
     assert issubclass(service, ServiceAdapter)
     assert service.request is adapter_for("runtime_groups/srv/Set_Request", registry)
     assert service.response.custom_type(ok=True).ok
+    assert service.Request(on=True) == service.request.new(on=True)
+    assert service.Response is service.response.custom_type
     assert service.ros_class == "runtime_groups.srv:Set"
     assert issubclass(action, ActionAdapter)
     assert action.send_goal is adapter_for("runtime_groups/action/Go_SendGoal", registry)
     assert action.send_goal.request.fields[1].nested is action.goal
     assert action.feedback_message.ros_class == "runtime_groups.action:Go.Impl.FeedbackMessage"
+    parts = (action.goal, action.result, action.feedback)
+    assert (action.Goal, action.Result, action.Feedback) == tuple(part.custom_type for part in parts)
 
 
 def test_attributes_are_those_of_generated_adapters(generated_things: SimpleNamespace) -> None:

@@ -11,7 +11,7 @@ from rosidl_adapter_proto.generate.targets.python.comments import docstring_line
 from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer, method
 from rosidl_adapter_proto.generate.targets.python.names import Names
 from rosidl_adapter_proto.interfaces.model import Interface, TypeName
-from rosidl_adapter_proto.schema.conversion import has_defaults, message_conversion, ros_class
+from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue, plain_lines
 
 
@@ -134,23 +134,17 @@ def _field_info(field: ProtoField, adapter_names: Mapping[TypeName, str]) -> str
     return ", ".join(map(str, arguments))
 
 
-_GROUPS = {
-    "request": ("ServiceAdapter", ("request", "response")),
-    "goal": ("ActionAdapter", ("goal", "result", "feedback")),
-}
-"""The base class of a group, and the parts that it is parametrized with, by the first part."""
-
-
 def group_adapter(
     name: TypeName, group: Mapping[str, TypeName], interface: Interface, names: Names
 ) -> GroupAdapter:
     """Decide what the class is that groups the adapters of a service or an action of an interface."""
-    base, parameters = _GROUPS[next(iter(group))]
     return GroupAdapter(
         name=name.name,
         class_name=names.adapter(name),
-        base=base,
-        custom_types=tuple((part.capitalize(), group[part].name) for part in parameters),
+        base="ServiceAdapter" if "request" in group else "ActionAdapter",
+        custom_types=tuple(
+            (NAMED_PARTS[part], each.name) for part, each in group.items() if part in NAMED_PARTS
+        ),
         type_name=str(name),
         type_hash=names.catalog.hash(name),
         ros_class=ros_class(name, interface),
