@@ -33,8 +33,8 @@ def test_wheel(wheel: Path, tmp_path: Path) -> None:
         "--distro",
         "kilted",
         folder=tmp_path,
-        **no_compiler,
+        variables=no_compiler,
     )
-    packages = {"PYTHONPATH": str(tmp_path / "generated/python")}
-    where = run(programs / "python", "-W", "error", "-c", USE, folder=tmp_path, **no_compiler, **packages)
+    packages = {**no_compiler, "PYTHONPATH": str(tmp_path / "generated/python")}
+    where = run(programs / "python", "-W", "error", "-c", USE, folder=tmp_path, variables=packages)
     assert where.startswith(str(tmp_path / "venv"))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import pytest
 from reference_cdr import write_cdr
 from ros_types import struct_type, transcoder
-from wire import DELIMITED, VARINT, delimited, double, fixed32, number, tag, varint
+
+from tests.transcode.wire import DELIMITED, VARINT, delimited, double, fixed32, number, tag, varint
 
 TYPES = {
     **struct_type("test/msg/Point", x="double", y="double", label="string"),
@@ -43,7 +45,7 @@ DEFAULT = {
 UNKNOWN = b"".join((number(900, 5), double(901, 1.5), fixed32(902, 7), delimited(903, b"whatever")))
 LONG = struct.pack("<q", 5)
 
-RULES = {
+RULES: dict[str, tuple[bytes, dict[str, Any]]] = {
     "nothing is all defaults": (b"", {}),
     "fields in any order": (number(FLAG, 1) + number(SMALL, 3), {"flag": True, "small": 3}),
     "descending order": (
