@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from google.protobuf.message import Message
 
 from rosidl_adapter_proto.adapter.lazy import (
+    LazyAttributes,
     find_ros_class,
     import_of_ros,
     lazy,
@@ -50,7 +51,7 @@ class FieldInfo(NamedTuple):
     nested: type[TypeAdapter[Any, Any]] | None = None
 
 
-class TypeAdapter(Generic[CustomT, RosT]):
+class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
     """Converts between a protobuf message and a ROS message (REP-2007, for Python).
 
     Generated classes derive from it; none is ever instantiated.
@@ -142,17 +143,28 @@ class TypeAdapter(Generic[CustomT, RosT]):
         return codec.to_cdr(source)
 
     @classmethod
-    def from_cdr(cls, data: Buffer) -> CustomT:
+    def from_cdr(cls, data: Buffer, fields: Iterable[str] | None = None) -> CustomT:
         """Return the protobuf message of a serialized ROS message: plain CDR of either byte order.
+
+        Args:
+            data: The serialized message.
+            fields: Which fields to read, such as `["header.stamp", "width"]`; the others are skipped and not even
+                looked at. By default all are read.
 
         Raises:
             ConversionError: The bytes are not a valid message of the type; with a codec it is a `TranscodeError`.
             RosNotFoundError: There is no codec, and the ROS message class or rclpy cannot be imported.
+            SchemaError: The type has no such field.
+            TypeError: There is no codec, and only some fields are asked for.
         """
         codec = cls.codec
         if codec is not None:
-            message: CustomT = codec.from_cdr(data)
+            message: CustomT = codec.from_cdr(data) if fields is None else codec.from_cdr(data, fields)
             return message
+        if fields is not None:
+            raise TypeError(
+                f"{name_of(cls)}: conversions that were written by hand take whole messages; leave `fields` out"
+            )
         deserialize, ros_class = (
             import_of_ros("rclpy.serialization", cls).deserialize_message,
             cls.ros_message_type,
@@ -222,7 +234,7 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
     }
 
 
-class ServiceAdapter(Generic[RequestT, ResponseT]):
+class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
 
     Attributes:
@@ -242,7 +254,7 @@ class ServiceAdapter(Generic[RequestT, ResponseT]):
     ros_class: ClassVar[str]
 
 
-class ActionAdapter(Generic[GoalT, ResultT, FeedbackT]):
+class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
 
     Attributes:
