@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from google.protobuf.message import Message
@@ -31,6 +31,19 @@ ResponseT = TypeVar("ResponseT", bound=Message)
 GoalT = TypeVar("GoalT", bound=Message)
 ResultT = TypeVar("ResultT", bound=Message)
 FeedbackT = TypeVar("FeedbackT", bound=Message)
+
+
+if TYPE_CHECKING:
+
+    class like_constructor:
+        """A class method that, to type checkers, takes what the constructor of the protobuf class takes."""
+
+        def __init__(self, method: Callable[..., Any]) -> None: ...
+
+        def __get__(self, instance: object, adapter: type[TypeAdapter[CustomT, Any]]) -> type[CustomT]: ...
+
+else:
+    like_constructor = classmethod
 
 
 class FieldInfo(NamedTuple):
@@ -177,7 +190,7 @@ class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
             raise ConversionError(name_of(cls), "", reason) from error
         return cls.convert_to_custom(ros_message)
 
-    @classmethod
+    @like_constructor
     def new(cls, /, **fields: Any) -> CustomT:
         """Make a protobuf message with the default values of the ROS definition, which proto3 cannot carry.
 
