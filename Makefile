@@ -71,7 +71,7 @@ check-mypy: $(VENV)/ready
 
 # The documents as a site, in build/site; warnings are errors.
 docs: $(VENV)/ready
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 # Slower than compiling, so not part of the tests.
 tidy: $(VENV)/ready

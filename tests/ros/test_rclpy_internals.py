@@ -31,7 +31,7 @@ import rclpy.service
 import rclpy.subscription
 import rclpy.task
 import rclpy.time
-from builtin_interfaces.msg import Duration, Time  # type: ignore[import-untyped]
+from builtin_interfaces.msg import Duration, Time
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
