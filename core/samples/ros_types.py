@@ -144,7 +144,7 @@ def hash_number(name: str) -> int:
     return number + 1000 if number >= 19000 else number
 
 
-def protobuf_class(types: Types, name: str, *, hashed: bool = True) -> type[Message]:
+def protobuf_class(types: Types, name: str, *, hashed: bool = True) -> type[Any]:
     """Make the protobuf class of a type, with hash numbers or in the order of declaration."""
     pool = descriptor_pool.DescriptorPool()
 
@@ -192,7 +192,7 @@ def protobuf_class(types: Types, name: str, *, hashed: bool = True) -> type[Mess
 
 def transcoder(
     types: Types, name: str, *, hashed: bool = True, **options: Any
-) -> tuple[Transcoder, type[Message]]:
+) -> tuple[Transcoder, type[Any]]:
     """Return the transcoder of a type and its protobuf class."""
     message_class = protobuf_class(types, name, hashed=hashed)
     return Transcoder(describe(types, name), message_class.DESCRIPTOR, **options), message_class

@@ -16,6 +16,7 @@ import traceback
 
 import click
 
+from rosidl_adapter_proto import __version__
 from rosidl_adapter_proto.cli import commands
 from rosidl_adapter_proto.cli.configuration import ConfiguredGroup
 from rosidl_adapter_proto.errors import Error, RequestError
@@ -26,7 +27,7 @@ EXIT_INTERRUPTED = 130
 
 
 @click.group(cls=ConfiguredGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="rosidl-adapter-proto")
+@click.version_option(__version__)
 @click.option("--debug", is_flag=True, help="Show where in the program an error comes from.")
 def program(debug: bool) -> None:
     """Protobuf types and adapters from ROS 2 interface definitions.

@@ -136,8 +136,8 @@ class FakePart:
 
 @pytest.fixture
 def fake_ros(things: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> Any:
-    ros_module = SimpleNamespace(Everything=FakeEverything, Part=FakePart)
-    monkeypatch.setitem(sys.modules, "things.msg", ros_module)  # type: ignore[arg-type]
+    ros_module: Any = SimpleNamespace(Everything=FakeEverything, Part=FakePart)
+    monkeypatch.setitem(sys.modules, "things.msg", ros_module)
     return things.msg.EverythingAdapter
 
 
@@ -175,7 +175,7 @@ def test_round_trip_with_any_class(things: SimpleNamespace, fake_ros: Any) -> No
 def test_bad_protobuf_values(
     things: SimpleNamespace, fake_ros: Any, fields: dict[str, Any], text: str
 ) -> None:
-    destination = FakeEverything(name="before")
+    destination: Any = FakeEverything(name="before")
     with pytest.raises(ConversionError) as caught:
         fake_ros.convert_to_ros_message(things.msg.Everything(name="after", **fields), destination)
     assert str(caught.value) == f"things/msg/Everything.{text}"

@@ -23,17 +23,24 @@ OUT = Path("out")
 
 
 def number(
-    fields: str, lock_file: Path | str = LOCK_FILE, output: Path = OUT, *packages: str, **how: bool
+    fields: str,
+    lock_file: Path | str = LOCK_FILE,
+    output: Path = OUT,
+    *packages: str,
+    deps: bool = True,
+    check: bool = False,
+    renumber: bool = False,
 ) -> Result:
     """Generate a package, whose message A has these fields, with sequential numbers; `more` refers to it."""
     definition = "".join(f"int32 {name}\n" for name in fields.split())
     source = Path("src")
     write_package(source / "my_msgs", {"msg/A.msg": definition})
     write_package(source / "more", {"msg/B.msg": "my_msgs/A a\nint32 b\n"})
-    deps = how.pop("deps", True)
     options = Options(numbering="sequential", lock_file=Path(lock_file))
     request = Request(packages or ("my_msgs",), dependencies=deps)
-    return generate(request, Catalog((folder_source(source),)), output, options, **how)
+    return generate(
+        request, Catalog((folder_source(source),)), output, options, check=check, renumber=renumber
+    )
 
 
 def by_hash(output: Path = OUT, *, renumber: bool = False) -> Result:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import signal
 import subprocess
@@ -14,7 +15,6 @@ from pathlib import Path
 import pytest
 
 from rosidl_adapter_proto.errors import GenerateError
-from rosidl_adapter_proto.generate import output_tree
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, read_manifest
 from rosidl_adapter_proto.generate.output_tree import (
     STAGING_NAME,
@@ -440,7 +440,7 @@ def test_without_locks(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(descriptor: int, operation: int) -> None:
         raise OSError(errno.EBADF, "Bad file descriptor")
 
-    monkeypatch.setattr(output_tree.fcntl, "flock", refuse)
+    monkeypatch.setattr(fcntl, "flock", refuse)
 
     put(output, NEW)
 
@@ -450,11 +450,12 @@ def test_without_locks(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_while_moving_the_manifest_knows_both(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Manifest | None] = []
     unlink = Path.unlink
-    monkeypatch.setattr(
-        Path,
-        "unlink",
-        lambda path, missing_ok=False: (seen.append(read_manifest(output)), unlink(path))[1],
-    )
+
+    def look_and_unlink(path: Path, missing_ok: bool = False) -> None:
+        seen.append(read_manifest(output))
+        unlink(path)
+
+    monkeypatch.setattr(Path, "unlink", look_and_unlink)
 
     put(output, NEW)
 

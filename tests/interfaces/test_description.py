@@ -136,10 +136,17 @@ def test_structs() -> None:
         return [str(each.name).rpartition("/")[2] for each in found]
 
     assert names(structs(Message(OTHER, empty))) == ["Other"]
-    parts = [Message(service.sibling(each), empty) for each in ("_Request", "_Response")]
-    assert names(structs(Service(service, *parts))) == ["Do", "Do_Request", "Do_Response", "Do_Event"]
-    parts = [Message(action.sibling(each), empty) for each in ("_Goal", "_Result", "_Feedback")]
-    assert names(structs(Action(action, *parts))) == [
+    request, response = (Message(service.sibling(each), empty) for each in ("_Request", "_Response"))
+    assert names(structs(Service(service, request, response))) == [
+        "Do",
+        "Do_Request",
+        "Do_Response",
+        "Do_Event",
+    ]
+    goal, result, feedback = (
+        Message(action.sibling(each), empty) for each in ("_Goal", "_Result", "_Feedback")
+    )
+    assert names(structs(Action(action, goal, result, feedback))) == [
         *("Go", "Go_Goal", "Go_Result", "Go_Feedback"),
         *("Go_SendGoal", "Go_SendGoal_Request", "Go_SendGoal_Response", "Go_SendGoal_Event"),
         *("Go_GetResult", "Go_GetResult_Request", "Go_GetResult_Response", "Go_GetResult_Event"),

@@ -20,6 +20,7 @@ from rosidl_adapter_proto.interfaces.model import (
     BasicType,
     Constant,
     Field,
+    FieldType,
     Interface,
     Location,
     Message,
@@ -152,7 +153,7 @@ LIMIT = "const uint32 LIMIT = 4; module Foo_Constants { const short N = 3; };"
         ("long a[B];", "enum E { A, B };", ArrayType(INT32, 1)),
     ],
 )
-def test_types(member: str, before: str, expected: object) -> None:
+def test_types(member: str, before: str, expected: FieldType) -> None:
     assert parse_field(member, before) == Field("a", expected)
 
 
@@ -234,6 +235,8 @@ def test_random_expressions_are_read_as_by_rosidl_parser(member: str, expression
         Exception
     ):  # theirs has no exception of its own; ours reads more, and refuses what OMG IDL does not have
         return
+    assert isinstance(message, Message)
+    assert isinstance(theirs, Message)
     assert (message.fields, message.constants) == (theirs.fields, theirs.constants)
 
 
@@ -559,10 +562,11 @@ def test_action() -> None:
       struct Do_Goal { long a; }; struct Do_Result { long b; }; struct Do_Feedback { long c; };
     }; };"""
     action = parse_idl(text, name, "Do.idl")
-    parts = {"_Goal": "a", "_Result": "b", "_Feedback": "c"}
-    assert action == Action(
-        name, *(Message(name.sibling(part), (Field(field, INT32),)) for part, field in parts.items())
+    goal, result, feedback = (
+        Message(name.sibling(part), (Field(field, INT32),))
+        for part, field in {"_Goal": "a", "_Result": "b", "_Feedback": "c"}.items()
     )
+    assert action == Action(name, goal, result, feedback)
     assert action.text == text
 
 
@@ -1065,6 +1069,11 @@ def parts(interface: Interface) -> list[Message]:
     return [each for each in values if isinstance(each, Message)]
 
 
+def described(message: Message) -> list[tuple[str, tuple[str, ...], str | None]]:
+    members: list[Field | Constant] = [*message.fields, *message.constants]
+    return [(each.name, each.comment, each.unit) for each in members]
+
+
 @pytest.mark.parametrize(
     "path",
     oracle.installed_definitions(".idl")
@@ -1077,7 +1086,6 @@ def test_installed_files_are_read_as_by_rosidl_parser(path: Path) -> None:
     expected = oracle.parse_idl_with_rosidl(text)
     assert interface == expected
     for ours, theirs in zip(parts(interface), parts(expected), strict=True):
-        described = [(each.name, each.comment, each.unit) for each in (*theirs.fields, *theirs.constants)]
-        assert [(each.name, each.comment, each.unit) for each in (*ours.fields, *ours.constants)] == described
+        assert described(ours) == described(theirs)
         # `rosidl_parser` reads the annotations of a message only, not of the parts of services and actions.
         assert ours.comment == theirs.comment or not isinstance(interface, Message)

@@ -18,6 +18,7 @@ from rosidl_adapter_proto.interfaces.model import (
     BasicType,
     Constant,
     Field,
+    FieldType,
     Interface,
     Location,
     Message,
@@ -90,52 +91,49 @@ def test_there_are_installed_definitions(ros_prefix: Path) -> None:
 
 # Fields
 
+TYPES: dict[str, FieldType] = {
+    "bool": BOOL,
+    "byte": BYTE,
+    "char": UINT8,
+    "int8": INT8,
+    "uint8": UINT8,
+    "int16": BasicType("int16"),
+    "uint16": UINT16,
+    "int32": INT32,
+    "uint32": BasicType("uint32"),
+    "int64": INT64,
+    "uint64": UINT64,
+    "float32": FLOAT,
+    "float64": DOUBLE,
+    "string": STRING,
+    "wstring": WSTRING,
+    "string<=5": StringType(bound=5),
+    "wstring<=1_000": StringType(True, 1000),
+    "string<=+5": StringType(bound=5),
+    "Foo": FOO,
+    "Bar": TypeName("pkg", "msg", "Bar"),
+    "other/Bar": TypeName("other", "msg", "Bar"),
+    "o2_x/B1": TypeName("o2_x", "msg", "B1"),
+    "Sample_Bar": TypeName("pkg", "msg", "Sample_Bar"),
+    "other/Bar_Request": TypeName("other", "msg", "Bar_Request"),
+    "Bar_Feedback_Response": TypeName("pkg", "msg", "Bar_Feedback_Response"),
+    "Int32": TypeName("pkg", "msg", "Int32"),
+    "int32[]": SequenceType(INT32),
+    "int32[3]": ArrayType(INT32, 3),
+    "int32[+3]": ArrayType(INT32, 3),
+    "int32[<=3]": SequenceType(INT32, 3),
+    "byte[]": SequenceType(BYTE),
+    "string<=5[]": SequenceType(StringType(bound=5)),
+    "string<=5[2]": ArrayType(StringType(bound=5), 2),
+    "wstring<=5[<=2]": SequenceType(StringType(True, 5), 2),
+    "wstring<=5[]": SequenceType(StringType(True, 5), 5),
+    "wstring<=5[2]": ArrayType(StringType(True, 5), 2),
+    "wstring[]": SequenceType(WSTRING),
+    "Bar[2]": ArrayType(TypeName("pkg", "msg", "Bar"), 2),
+    "other/Bar[<=2]": SequenceType(TypeName("other", "msg", "Bar"), 2),
+}
 FIELDS: list[tuple[str, Field]] = [
-    # Types
-    *(
-        (f"{spelling} x", Field("x", type_))
-        for spelling, type_ in {
-            "bool": BOOL,
-            "byte": BYTE,
-            "char": UINT8,
-            "int8": INT8,
-            "uint8": UINT8,
-            "int16": BasicType("int16"),
-            "uint16": UINT16,
-            "int32": INT32,
-            "uint32": BasicType("uint32"),
-            "int64": INT64,
-            "uint64": UINT64,
-            "float32": FLOAT,
-            "float64": DOUBLE,
-            "string": STRING,
-            "wstring": WSTRING,
-            "string<=5": StringType(bound=5),
-            "wstring<=1_000": StringType(True, 1000),
-            "string<=+5": StringType(bound=5),
-            "Foo": FOO,
-            "Bar": TypeName("pkg", "msg", "Bar"),
-            "other/Bar": TypeName("other", "msg", "Bar"),
-            "o2_x/B1": TypeName("o2_x", "msg", "B1"),
-            "Sample_Bar": TypeName("pkg", "msg", "Sample_Bar"),
-            "other/Bar_Request": TypeName("other", "msg", "Bar_Request"),
-            "Bar_Feedback_Response": TypeName("pkg", "msg", "Bar_Feedback_Response"),
-            "Int32": TypeName("pkg", "msg", "Int32"),
-            "int32[]": SequenceType(INT32),
-            "int32[3]": ArrayType(INT32, 3),
-            "int32[+3]": ArrayType(INT32, 3),
-            "int32[<=3]": SequenceType(INT32, 3),
-            "byte[]": SequenceType(BYTE),
-            "string<=5[]": SequenceType(StringType(bound=5)),
-            "string<=5[2]": ArrayType(StringType(bound=5), 2),
-            "wstring<=5[<=2]": SequenceType(StringType(True, 5), 2),
-            "wstring<=5[]": SequenceType(StringType(True, 5), 5),
-            "wstring<=5[2]": ArrayType(StringType(True, 5), 2),
-            "wstring[]": SequenceType(WSTRING),
-            "Bar[2]": ArrayType(TypeName("pkg", "msg", "Bar"), 2),
-            "other/Bar[<=2]": SequenceType(TypeName("other", "msg", "Bar"), 2),
-        }.items()
-    ),
+    *((f"{spelling} x", Field("x", type_)) for spelling, type_ in TYPES.items()),
     # Names
     *(
         (f"string {name}", Field(name, STRING))
@@ -323,7 +321,7 @@ def test_constants(text: str, expected: Constant, tmp_path: Path) -> None:
 
 # Lines, comments and the places of fields
 
-A_AND_B = {"a": (), "b": ()}
+A_AND_B: dict[str, tuple[str, ...]] = {"a": (), "b": ()}
 LAYOUTS: list[tuple[str, dict[str, tuple[str, ...]], tuple[str, ...]]] = [
     # Each row: the text, the comments of its fields, the comment of the message
     ("", {EMPTY_STRUCT_FIELD: ()}, ()),
@@ -490,7 +488,8 @@ def test_random_comments_are_accepted_where_ros_does(
 
 def test_locations() -> None:
     message = parse_message("# file\r\n\r\nint8 a\r\nint8\t \tb 5 # c\r\nint8  X = 3")
-    assert [each.location for each in (*message.fields, *message.constants)] == [
+    members: list[Field | Constant] = [*message.fields, *message.constants]
+    assert [each.location for each in members] == [
         Location("Foo.msg", 3, 6),
         Location("Foo.msg", 4, 8),
         Location("Foo.msg", 5, 7),
@@ -568,11 +567,11 @@ def test_services(
 )
 def test_actions(text: str, fields: list[tuple[Field, ...]], tmp_path: Path) -> None:
     action = parse(text, GO)
-    messages = (
+    goal, result, feedback = (
         Message(GO.sibling(suffix), each)
         for suffix, each in zip(("_Goal", "_Result", "_Feedback"), fields, strict=True)
     )
-    assert action == Action(GO, *messages)
+    assert action == Action(GO, goal, result, feedback)
     assert isinstance(action, Action)
     assert action.text == text
     theirs = official(text, GO, tmp_path)

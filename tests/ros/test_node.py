@@ -108,7 +108,8 @@ def test_adapters_of_other_protobuf_classes(node: Any, adapter: Any) -> None:
         descriptor = pool.FindMessageTypeByName(name)
         if hasattr(message_factory, "GetMessageClass"):
             return message_factory.GetMessageClass(descriptor)
-        return message_factory.MessageFactory(pool).GetPrototype(descriptor)  # before protobuf 4.22
+        factory: Any = message_factory.MessageFactory(pool)
+        return factory.GetPrototype(descriptor)  # before protobuf 4.22
 
     pool = descriptor_pool.DescriptorPool()
     file = descriptor_pb2.FileDescriptorProto(name="mine/Text.proto", package="mine", syntax="proto3")
@@ -360,7 +361,8 @@ def test_context_managers(ros: None, adapter: Any, text: Any) -> None:
 
     if not hasattr(rclpy.node.Node, "__enter__"):
         pytest.skip("this rclpy has no context managers")
-    trigger = examples.adapter("std_srvs/srv/Trigger")
+    trigger: Any = examples.adapter("std_srvs/srv/Trigger")
+    client: Any
     with (
         Node("managed") as node,
         node.create_publisher(adapter, "managed", 10) as publisher,
@@ -388,8 +390,8 @@ def test_a_publisher_class_of_the_user(node: Any, adapter: Any, text: Any) -> No
 
     publisher = node.create_publisher(adapter, "counting", 10, publisher_class=Counting)
     publisher.publish(text("one"))
-    assert isinstance(publisher, (Counting, rosidl_adapter_proto.ros.Publisher))
     assert publisher.count == 1
+    assert isinstance(publisher, (Counting, rosidl_adapter_proto.ros.Publisher))
 
 
 # --- Subscriptions ---
@@ -624,7 +626,8 @@ def test_executors(ros: None, adapter: Any, text: Any, name: str) -> None:
     spin_until(action_client.server_is_ready)
     goal = action_client.send_goal_async(fibonacci.goal.custom_type(order=5))
     executor.spin_until_future_complete(goal, timeout_sec=SECONDS)
-    result = goal.result().get_result_async()
+    accepted: Any = goal.result()
+    result: Any = accepted.get_result_async()
     executor.spin_until_future_complete(result, timeout_sec=SECONDS)
     assert result.result().result == fibonacci.result.custom_type(sequence=[5])
 

@@ -71,7 +71,7 @@ class Huge:
 
 
 def test_message_that_protobuf_does_not_serialize() -> None:
-    codec: Codec[Any] = Codec(DESCRIPTION, Huge)  # type: ignore[type-var]
+    codec: Codec[Any] = Codec(DESCRIPTION, Huge)
     with pytest.raises(ConversionError) as caught:
         codec.to_cdr(Huge())
     assert str(caught.value) == (
@@ -84,7 +84,7 @@ def test_message_that_protobuf_does_not_serialize() -> None:
 @pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt(), ValueError("other")])
 def test_other_errors_stay_what_they_are(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     monkeypatch.setattr(Huge, "error", error)
-    codec: Codec[Any] = Codec(DESCRIPTION, Huge)  # type: ignore[type-var]
+    codec: Codec[Any] = Codec(DESCRIPTION, Huge)
     with pytest.raises(type(error)) as caught:
         codec.to_cdr(Huge())
     assert caught.value is error
@@ -314,7 +314,7 @@ def test_odd_arguments() -> None:
         _core.Transcoder(b"no plan", "test/msg/Time", 100)
     for arguments in ((5, "x", 100), (b"", 5, 100), (b"", "x", "100"), (b"", "x", -1)):
         with pytest.raises(TypeError):
-            _core.Transcoder(*arguments)  # type: ignore[arg-type]
+            _core.Transcoder(*arguments)
     with pytest.raises(TypeError):
         _core.Codec(5, Time)  # type: ignore[arg-type]
     with pytest.raises(AttributeError):

@@ -8,10 +8,21 @@ from typing import Any
 
 import pytest
 from ros_types import Types, describe, protobuf_class, struct_type, transcoder
-from wire import DELIMITED, FIXED64, GROUP_END, GROUP_START, VARINT, delimited, double, number, tag, varint
 
 from rosidl_adapter_proto.errors import Error, SchemaError
 from rosidl_adapter_proto.transcode import TranscodeError, Transcoder
+from tests.transcode.wire import (
+    DELIMITED,
+    FIXED64,
+    GROUP_END,
+    GROUP_START,
+    VARINT,
+    delimited,
+    double,
+    number,
+    tag,
+    varint,
+)
 
 POINT = struct_type("test/msg/Point", x="double", name="string")
 TYPES: Types = {

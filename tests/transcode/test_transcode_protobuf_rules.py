@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import pytest
 from reference_cdr import write_cdr
 from ros_types import struct_type, transcoder
-from wire import DELIMITED, GROUP_END, GROUP_START, VARINT, delimited, double, fixed32, number, tag, varint
+
+from tests.transcode.wire import (
+    DELIMITED,
+    GROUP_END,
+    GROUP_START,
+    VARINT,
+    delimited,
+    double,
+    fixed32,
+    number,
+    tag,
+    varint,
+)
 
 TYPES = {
     **struct_type("test/msg/Point", x="double", y="double", label="string"),
@@ -55,7 +68,7 @@ GROUP = b"".join(
 )
 LONG = struct.pack("<q", 5)
 
-RULES = {
+RULES: dict[str, tuple[bytes, dict[str, Any]]] = {
     "nothing is all defaults": (b"", {}),
     "fields in any order": (number(FLAG, 1) + number(SMALL, 3), {"flag": True, "small": 3}),
     "descending order": (
