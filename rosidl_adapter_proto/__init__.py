@@ -29,6 +29,8 @@ if TYPE_CHECKING:
         PROTO_SERVICE_CALL_NAME,
     )
 
+__version__ = "0.1.0"  # pyproject.toml reads it here
+
 __all__ = [
     "MSG_TYPE_TO_PROTO",
     "PROTO_ACTION_GET_RESULT_CALL_NAME",

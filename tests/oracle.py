@@ -56,8 +56,8 @@ def _interface(found: Any) -> Interface:
     if type(found).__name__ == "Service":
         request, response = _message(found.request_message), _message(found.response_message)
         return Service(_named_type(found.namespaced_type), request, response)
-    parts = (_message(each) for each in (found.goal, found.result, found.feedback))
-    return Action(_named_type(found.namespaced_type), *parts)
+    goal, result, feedback = (_message(each) for each in (found.goal, found.result, found.feedback))
+    return Action(_named_type(found.namespaced_type), goal, result, feedback)
 
 
 def _message(found: Any) -> Message:
@@ -108,7 +108,8 @@ def _parameters(value: Any) -> tuple[tuple[str, Any], ...]:
 
 
 def _named_type(found: Any) -> TypeName:
-    return TypeName(*found.namespaces, found.name)
+    package, namespace = found.namespaces
+    return TypeName(package, namespace, found.name)
 
 
 def _type(found: Any) -> FieldType:

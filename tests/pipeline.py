@@ -110,5 +110,8 @@ def _with_units(message: Message, units: dict[tuple[str, str], str]) -> Message:
 def _with_messages(interface: Interface, messages: list[Message]) -> Interface:
     if isinstance(interface, Message):
         return messages[0]
-    kind = Service if isinstance(interface, Service) else Action
-    return kind(interface.name, *messages)
+    if isinstance(interface, Service):
+        request, response = messages
+        return Service(interface.name, request, response)
+    goal, result, feedback = messages
+    return Action(interface.name, goal, result, feedback)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 
 
-def run(*command: str | Path, folder: Path, code: int = 0, **variables: str) -> str:
+def run(*command: str | Path, folder: Path, code: int = 0, variables: Mapping[str, str] | None = None) -> str:
     """Run a program, and return what it prints: of one that fails, what it says of its errors.
 
     Args:
@@ -17,8 +18,7 @@ def run(*command: str | Path, folder: Path, code: int = 0, **variables: str) -> 
         variables: Variables of its environment, which has none for Python.
     """
     environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
-    done = subprocess.run(
-        command, cwd=folder, env={**environment, **variables}, capture_output=True, check=False, text=True
-    )
+    environment.update(variables or {})
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False, text=True)
     assert done.returncode == code, done.stdout + done.stderr
     return done.stderr if code else done.stdout

@@ -12,6 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TOP = [ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 ONE_PROGRAM = "rclpy.md"  # its blocks are one program, which tests/ros runs
 BUILDS = ("build-colcon.md", "build-setuptools.md", "build-hatch.md")  # tests/hooks runs them
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -50,7 +51,7 @@ def test_blocks_run(document: Path, installed: Path, tmp_path: Path) -> None:
         run(tmp_path, installed, kind, text)
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+@pytest.mark.parametrize("document", [*DOCUMENTS, *TOP], ids=lambda path: path.name)
 def test_links_lead_somewhere(document: Path) -> None:
     for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8")):
         assert (document.parent / target).exists(), target

@@ -21,11 +21,11 @@ from rosidl_adapter_proto.time import set_stamp, to_datetime, to_message, to_nan
 REGISTRY = (
     TypeRegistry()
 )  # what is installed, as for all that tests generate: a process has one version of a type
-Time = REGISTRY["builtin_interfaces/msg/Time"].message_class
-Duration = REGISTRY["builtin_interfaces/msg/Duration"].message_class
-Header = REGISTRY["std_msgs/msg/Header"].message_class
-Imu = REGISTRY["sensor_msgs/msg/Imu"].message_class
-String = REGISTRY["std_msgs/msg/String"].message_class
+Time: Any = REGISTRY["builtin_interfaces/msg/Time"].message_class
+Duration: Any = REGISTRY["builtin_interfaces/msg/Duration"].message_class
+Header: Any = REGISTRY["std_msgs/msg/Header"].message_class
+Imu: Any = REGISTRY["sensor_msgs/msg/Imu"].message_class
+String: Any = REGISTRY["std_msgs/msg/String"].message_class
 
 NANOSECONDS = st.integers(-(2**31) * 10**9, (2**31) * 10**9 - 1)
 """What 32 bits of seconds can hold."""
@@ -95,7 +95,7 @@ def test_timedeltas_come_back(duration: timedelta) -> None:
     assert to_timedelta(expected) == duration
 
 
-def of_ros(name: str, **fields: int) -> Any:
+def of_ros(name: str, **fields: Any) -> Any:
     """Return what looks like a message of ROS."""
     return type(name, (SimpleNamespace,), {"__module__": "builtin_interfaces.msg._x"})(**fields)
 

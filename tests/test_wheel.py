@@ -5,6 +5,7 @@ from __future__ import annotations
 import venv
 from pathlib import Path
 
+import rosidl_adapter_proto
 from tests.programs import run
 
 USE = """
@@ -14,6 +15,10 @@ assert HeaderAdapter.from_cdr(HeaderAdapter.to_cdr(header)).frame_id == "map"
 import rosidl_adapter_proto
 print(rosidl_adapter_proto.__file__)
 """
+
+
+def test_version_of_the_wheel(wheel: Path) -> None:
+    assert wheel.name.startswith(f"rosidl_adapter_proto-{rosidl_adapter_proto.__version__}-")
 
 
 def test_wheel(wheel: Path, tmp_path: Path) -> None:
@@ -28,8 +33,8 @@ def test_wheel(wheel: Path, tmp_path: Path) -> None:
         "--distro",
         "kilted",
         folder=tmp_path,
-        **no_compiler,
+        variables=no_compiler,
     )
-    packages = {"PYTHONPATH": str(tmp_path / "generated/python")}
-    where = run(programs / "python", "-W", "error", "-c", USE, folder=tmp_path, **no_compiler, **packages)
+    packages = {**no_compiler, "PYTHONPATH": str(tmp_path / "generated/python")}
+    where = run(programs / "python", "-W", "error", "-c", USE, folder=tmp_path, variables=packages)
     assert where.startswith(str(tmp_path / "venv"))

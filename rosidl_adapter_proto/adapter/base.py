@@ -203,7 +203,7 @@ class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
             if nested is None or not nested.has_defaults or info.name in fields:
                 continue
             if info.type_id == _NESTED:
-                getattr(message, info.name).CopyFrom(nested.new())
+                copy_message(nested.new(), getattr(message, info.name))
             elif info.type_id == _NESTED_ARRAY:
                 getattr(message, info.name).extend(nested.new() for _ in range(info.capacity))
         return message
@@ -222,6 +222,11 @@ class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
             "type_description": _individual_description(cls),
             "referenced_type_descriptions": [_individual_description(found[name]) for name in sorted(found)],
         }
+
+
+def copy_message(source: Message, destination: Message) -> None:
+    """Overwrite a protobuf message with another, which may have a field called `CopyFrom`."""
+    type(destination).CopyFrom(destination, source)
 
 
 # type_description_interfaces/msg/FieldType

@@ -116,7 +116,7 @@ def _message_adapter(registry: TypeRegistry, schema: Schema, adapters: Mapping[T
                 if each.default is not None
             },
             "has_defaults": has_defaults(proto.source, lambda name: _source(registry[name])),
-            **{constant_name(name): value for name, value in schema.constants.items()},
+            **{constant_name(name, proto.name): value for name, value in schema.constants.items()},
             **_conversions(proto, adapters),
         },
     )
@@ -149,7 +149,7 @@ def _conversions(proto: ProtoMessage, adapters: Mapping[TypeName, Any]) -> dict[
     packed_numbers = conversion.packed_numbers
 
     def fill_custom(source: Any, message: Any) -> None:
-        message.SetInParent()
+        type(message).SetInParent(message)
         field = ""
         try:
             for field, fill in fill_custom_fields:  # noqa: B007  # errors name it

@@ -7,6 +7,7 @@ fault); 130 interrupted.
 
 from __future__ import annotations
 
+import errno
 import importlib
 import io
 import pkgutil
@@ -15,6 +16,7 @@ import traceback
 
 import click
 
+from rosidl_adapter_proto import __version__
 from rosidl_adapter_proto.cli import commands
 from rosidl_adapter_proto.cli.configuration import ConfiguredGroup
 from rosidl_adapter_proto.errors import Error, RequestError
@@ -25,7 +27,7 @@ EXIT_INTERRUPTED = 130
 
 
 @click.group(cls=ConfiguredGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="rosidl-adapter-proto")
+@click.version_option(__version__)
 @click.option("--debug", is_flag=True, help="Show where in the program an error comes from.")
 def program(debug: bool) -> None:
     """Protobuf types and adapters from ROS 2 interface definitions.
@@ -61,6 +63,11 @@ def main(arguments: list[str] | None = None) -> None:
             traceback.print_exc()
         if isinstance(error, Error):
             click.echo(f"Error: {error}", err=True)
+        elif isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
+            # Whatever writes files says which one; what is printed has no name.
+            click.echo(
+                f"Error: cannot write to the standard output: {error.strerror}; make room there", err=True
+            )
         else:
             click.echo(f"Internal error: {error!r}; --debug shows where it comes from", err=True)
         sys.exit(EXIT_USAGE if isinstance(error, RequestError) else EXIT_FAILED)

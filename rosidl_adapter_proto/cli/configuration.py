@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.configuration import find_configuration
 
 _ARGUMENTS = {"packages": "what"}
@@ -18,10 +19,23 @@ class ConfiguredGroup(click.Group):
 
     def invoke(self, context: click.Context) -> Any:
         """Give every command the defaults of the configuration, and run the one that was asked for."""
-        found = find_configuration(Path.cwd())
+        try:
+            folder = Path.cwd()
+        except OSError as error:
+            raise RequestError(
+                f"cannot tell the current folder: {error.strerror}; change to one that exists"
+            ) from None
+        found = find_configuration(folder)
         if found is not None:
             values = {
                 _ARGUMENTS.get(name, name.replace("-", "_")): each for name, each in found.values.items()
             }
-            context.default_map = dict.fromkeys(self.commands, values)
+            context.default_map = _defaults(self, values)
         return super().invoke(context)
+
+
+def _defaults(command: click.Command, values: dict[str, Any]) -> dict[str, Any]:
+    """Return what click looks up for a command: its values, or those of each command in a group."""
+    if not isinstance(command, click.Group):
+        return values
+    return {name: _defaults(each, values) for name, each in command.commands.items()}

@@ -69,7 +69,7 @@ def read_configuration(folder: Path) -> Configuration | None:
     """
     for name, read in (("pyproject.toml", _read_toml), ("setup.cfg", _read_ini)):
         file = folder / name
-        if not file.is_file():
+        if not os.path.isfile(file):
             continue
         try:
             section = read(file.read_text(encoding="utf-8"))
@@ -130,7 +130,7 @@ def _located(setting: Setting, value: Any, file: Path) -> Any:
 
 
 def _is_path(text: str, folder: Path) -> bool:
-    return is_path(text) or ("/" in text and (folder / text).exists())
+    return is_path(text) or ("/" in text and os.path.exists(folder / text))
 
 
 def _path(text: str, file: Path) -> str:

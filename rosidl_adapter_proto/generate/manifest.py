@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -13,7 +13,20 @@ from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.interfaces.model import TypeName
 
 MANIFEST_NAME = ".rosidl-proto.json"
-_VERSION = 1
+_VERSION = 2
+
+
+@dataclass(frozen=True)
+class SequentialNumbers:
+    """The sequential numbers that an output folder knows.
+
+    Attributes:
+        lock_file: The path of the lock file that they are from, relative to the folder.
+        fields: The numbers of each message, by its ROS name and the field's, those of removed fields included.
+    """
+
+    lock_file: str
+    fields: Mapping[str, Mapping[str, int]]
 
 
 @dataclass(frozen=True)
@@ -24,11 +37,13 @@ class Manifest:
         fingerprint: A digest of everything that the files depend on.
         interfaces: The interfaces they were made from, dependencies included.
         outputs: The digest of each file, by its path relative to the folder.
+        numbers: The numbers of fields; None if they are hashes.
     """
 
     fingerprint: str
     interfaces: tuple[TypeName, ...]
     outputs: Mapping[str, str]
+    numbers: SequentialNumbers | None = None
 
     def to_json(self) -> bytes:
         """Return the content of the manifest file."""
@@ -37,6 +52,7 @@ class Manifest:
             "fingerprint": self.fingerprint,
             "interfaces": list(map(str, self.interfaces)),
             "outputs": dict(self.outputs),
+            "numbers": asdict(self.numbers) if self.numbers else None,
         }
         return (json.dumps(content, indent=1) + "\n").encode()
 
@@ -69,7 +85,19 @@ def _parse(content: Any) -> Manifest:
         parts = PurePosixPath(path)
         if not parts.parts or parts.is_absolute() or ".." in parts.parts:
             raise ValueError(f"it names {path!r}, which is not inside the folder")
-    return Manifest(content["fingerprint"], tuple(map(TypeName.parse, content["interfaces"])), outputs)
+    numbers = None if content["numbers"] is None else _parse_numbers(content["numbers"])
+    interfaces = tuple(map(TypeName.parse, content["interfaces"]))
+    return Manifest(content["fingerprint"], interfaces, outputs, numbers)
+
+
+def _parse_numbers(content: Any) -> SequentialNumbers:
+    return SequentialNumbers(
+        content["lock_file"],
+        {
+            message: {name: int(number) for name, number in fields.items()}
+            for message, fields in content["fields"].items()
+        },
+    )
 
 
 def is_intact(output: Path, manifest: Manifest) -> bool:

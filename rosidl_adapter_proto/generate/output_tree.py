@@ -17,11 +17,17 @@ import sys
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from types import FrameType
 
 from rosidl_adapter_proto.errors import GenerateError
-from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, digest, read_manifest
+from rosidl_adapter_proto.generate.manifest import (
+    MANIFEST_NAME,
+    Manifest,
+    SequentialNumbers,
+    digest,
+    read_manifest,
+)
 from rosidl_adapter_proto.interfaces.model import TypeName
 
 if sys.platform != "win32":
@@ -78,21 +84,26 @@ def _has_files(output: Path) -> bool:
     )
 
 
-def make_manifest(fingerprint: str, interfaces: Iterable[TypeName], files: Mapping[str, bytes]) -> Manifest:
+def make_manifest(
+    fingerprint: str,
+    interfaces: Iterable[TypeName],
+    files: Mapping[str, bytes],
+    numbers: SequentialNumbers | None = None,
+) -> Manifest:
     """Return the manifest of a folder that holds `files`."""
-    return Manifest(
-        fingerprint, tuple(interfaces), {path: digest(content) for path, content in sorted(files.items())}
-    )
+    outputs = {path: digest(content) for path, content in sorted(files.items())}
+    return Manifest(fingerprint, tuple(interfaces), outputs, numbers)
 
 
 def changes(output: Path, files: Mapping[str, bytes]) -> Changes:
     """Return what has to be done so that a folder holds `files`.
 
     Raises:
-        GenerateError: It has a file of somebody else in the place of one of ours.
+        GenerateError: It has a file of somebody else, or a link to another folder, in the place of one of ours.
     """
     old = read_manifest(output)
     made = old.outputs if old else {}
+    _check_inside(output, (*files, *made))
     written = []
     for path, content in files.items():
         present = _read(output / path)
@@ -126,7 +137,8 @@ def write(output: Path, manifest: Manifest, files: Mapping[str, bytes]) -> Chang
                 _make_folder(folder, cleanup)
                 if not os.access(folder, os.W_OK):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(folder))
-            both = Manifest("", (), {**(old.outputs if old else {}), **manifest.outputs})
+            outputs = {**(old.outputs if old else {}), **manifest.outputs}
+            both = Manifest("", (), outputs, manifest.numbers)
             moves = [(MANIFEST_NAME, both.to_json())]
             moves += [(path, files[path]) for path in planned.written]
             moves += [(MANIFEST_NAME, manifest.to_json())]
@@ -246,7 +258,18 @@ def _read(file: Path) -> bytes | None:
 
 
 def _is_file(file: Path) -> bool:
-    return file.is_file() or file.is_symlink()
+    return os.path.isfile(file) or os.path.islink(file)
+
+
+def _check_inside(output: Path, paths: Iterable[str]) -> None:
+    """Check that no folder of a file of ours is a symbolic link: what is behind it is not ours to change or remove."""
+    folders = {folder for path in paths for folder in PurePosixPath(path).parents}
+    for folder in sorted(folders - {PurePosixPath()}):
+        if os.path.islink(output / folder):
+            raise GenerateError(
+                f"{output / folder} is a symbolic link, and rosidl-proto changes nothing outside {output}; "
+                "remove the link, or choose another folder with --output"
+            )
 
 
 def _not_ours(file: Path) -> GenerateError:
@@ -279,9 +302,11 @@ def _remove(output: Path, path: str) -> None:
     """Remove a file, what Python cached of it, and the folders that are empty without it."""
     file = output / path
     file.unlink(missing_ok=True)
-    for cached in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
-        cached.unlink(missing_ok=True)
-    _remove_empty(file.parent / "__pycache__")
+    cache = file.parent / "__pycache__"
+    if not cache.is_symlink():
+        for cached in cache.glob(f"{file.stem}.*.pyc"):
+            cached.unlink(missing_ok=True)
+        _remove_empty(cache)
     for folder in file.parents:
         if folder == output or not _remove_empty(folder):
             break

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +69,7 @@ def find_request(
             names.append(text)
     catalog = find_catalog(include, distro, given)
     for text in names:
-        if text not in catalog.packages and Path(text).is_dir():
+        if text not in catalog.packages and os.path.isdir(text):
             source = folder_source(Path(text))
             catalog = Catalog((source, *catalog.sources))
             packages += source.packages
@@ -96,6 +97,10 @@ def _add_file(given: list[Source], source: Source, name: TypeName) -> None:
 
 
 def _existing(path: Path) -> Path:
-    if not path.exists():
-        raise RequestError(f"there is no file or folder {path}")
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        raise RequestError(f"there is no file or folder {path}") from None
+    except OSError as error:
+        raise RequestError(f"cannot read {path}: {error.strerror}; give another file or folder") from None
     return path

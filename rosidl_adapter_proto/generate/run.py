@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import keyword
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosidl_adapter_proto.errors import GenerateError
+from rosidl_adapter_proto.errors import GenerateError, SchemaError
 from rosidl_adapter_proto.generate import protoc
 from rosidl_adapter_proto.generate.fingerprint import fingerprint
+from rosidl_adapter_proto.generate.lock import check_numbers, read_lock, sequential_numbers, write_lock
 from rosidl_adapter_proto.generate.manifest import is_intact, read_manifest
 from rosidl_adapter_proto.generate.output_tree import (
     Changes,
-    alone_in,
     changes,
     check_ours,
     discard_left_over,
     make_manifest,
-    replace_file,
     write,
 )
 from rosidl_adapter_proto.generate.outputs import Progress, all_files
@@ -35,7 +34,7 @@ from rosidl_adapter_proto.schema.numbering import (
     Numbering,
     SequentialNumbering,
 )
-from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, proto_file
+from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, check_nesting, proto_file
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Result:
         interfaces: What was generated.
         changes: What changed in the output folder.
         lock_changed: Whether the lock file changed.
-        warnings: What the user should know.
+        warnings: What the user should know; that a lock file was made, among others.
     """
 
     interfaces: tuple[TypeName, ...]
@@ -67,6 +66,7 @@ def generate(
     options: Options = Options(),
     *,
     check: bool = False,
+    renumber: bool = False,
     progress: Progress | None = None,
 ) -> Result:
     """Generate everything for a request into a folder.
@@ -77,15 +77,17 @@ def generate(
         output: The folder to write; it then holds what this call makes, and nothing that an earlier one made.
         options: How to generate.
         check: Only find out what would change.
+        renumber: Let fields get other numbers than the folder was generated with: what was serialized with it cannot
+            be read any more.
         progress: Is called while interfaces are done.
 
     Raises:
         DefinitionError: A definition is missing or not valid.
         SchemaError: An interface cannot be mapped to protobuf, or the lock file disagrees.
-        GenerateError: The folder is not ours or cannot be written, or protoc failed.
+        GenerateError: The folder is not ours, has other numbers or cannot be written, or protoc failed.
     """
     check_ours(output)
-    lock_text = _read_lock(options)
+    lock_text = read_lock(options)
     old = read_manifest(output)
     if (
         old is not None
@@ -101,14 +103,23 @@ def generate(
     numbering = _numbering(options, lock_text)
     files = _generate_files(names, request, catalog, options, numbering, progress)
     new_lock_text = numbering.lock_text() if isinstance(numbering, SequentialNumbering) else lock_text
-    manifest = make_manifest(fingerprint(request, catalog, options, new_lock_text, names), names, files)
+    numbers = sequential_numbers(numbering, options, output, None if renumber else old)
+    if old is not None and not renumber:
+        check_numbers(output, old, numbers, options, lock_exists=lock_text is not None)
+    new_fingerprint = fingerprint(request, catalog, options, new_lock_text, names)
+    manifest = make_manifest(new_fingerprint, names, files, numbers)
     changed = changes(output, files)
+    # An unchanged run does not repeat those of definitions, since it parses nothing.
+    of_definitions = tuple(each for name in names for each in catalog.definition(name).interface.warnings)
+    warnings = (*of_definitions, *_warnings(catalog, names))
     if not check:
         # The lock file comes first: numbers that nothing uses yet do no harm, but used ones that are not kept do.
         if new_lock_text is not None and new_lock_text != lock_text:
-            _write_lock(options, lock_text, new_lock_text)
+            write_lock(options, lock_text, new_lock_text)
+            if lock_text is None:
+                warnings += (f"{options.lock_file} is new: it keeps the numbers of fields, so commit it",)
         changed = write(output, manifest, files)
-    return Result(tuple(names), changed, new_lock_text != lock_text, _warnings(catalog, names))
+    return Result(tuple(names), changed, new_lock_text != lock_text, warnings)
 
 
 def check_definitions(request: Request, catalog: Catalog, options: Options = Options()) -> list[TypeName]:
@@ -122,7 +133,7 @@ def check_definitions(request: Request, catalog: Catalog, options: Options = Opt
         GenerateError: The lock file cannot be read, or the name of the Python package is none.
     """
     names = closure(catalog, request.packages, request.types, events=options.events)
-    _proto_files(names, request, catalog, options, _numbering(options, _read_lock(options)))
+    _proto_files(names, request, catalog, options, _numbering(options, read_lock(options)))
     return names
 
 
@@ -133,7 +144,7 @@ def proto_text(name: TypeName, catalog: Catalog, options: Options = Options()) -
         DefinitionError: A definition is missing or not valid.
         SchemaError: The interface cannot be mapped to protobuf.
     """
-    numbering = _numbering(options, _read_lock(options))
+    numbering = _numbering(options, read_lock(options))
     interface = catalog.definition(name).interface
     file = proto_file(interface, numbering, catalog.definition_name, events=options.events)
     return render_proto(file)
@@ -156,7 +167,7 @@ def _generate_files(
 
 
 def _proto_files(
-    names: Iterable[TypeName], request: Request, catalog: Catalog, options: Options, numbering: Numbering
+    names: Sequence[TypeName], request: Request, catalog: Catalog, options: Options, numbering: Numbering
 ) -> list[ProtoFile]:
     _check_python_root(options.python_root)
     # What is only referred to is numbered elsewhere. Its numbers make no difference here, and belong into no lock file.
@@ -171,7 +182,25 @@ def _proto_files(
         for name in names
     ]
     check_names(protos)
+    check_nesting(protos)
+    for name in names:
+        _check_length(name)
     return protos
+
+
+def _check_length(name: TypeName) -> None:
+    excess = len(f"{name.name}{_LONGEST_ENDING}") - _LONGEST_FILE_NAME
+    if excess > 0:
+        raise SchemaError(
+            f"{name}: the name is {excess} characters too long for generated files, whose names have at most "
+            f"{_LONGEST_FILE_NAME}, {_LONGEST_ENDING!r} included; shorten it"
+        )
+
+
+_LONGEST_FILE_NAME = 255
+"""What file systems take."""
+_LONGEST_ENDING = "_adapter.py"
+"""The longest that the name of an interface gets in the name of a file."""
 
 
 def _check_python_root(name: str) -> None:
@@ -200,24 +229,3 @@ def _numbering(options: Options, lock_text: str | None) -> Numbering:
     if options.numbering == SequentialNumbering.name:
         return SequentialNumbering.from_lock(str(options.lock_file), lock_text)
     return HashNumbering()
-
-
-def _read_lock(options: Options) -> str | None:
-    if options.numbering != SequentialNumbering.name:
-        return None
-    try:
-        return options.lock_file.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return None
-    except (OSError, UnicodeDecodeError) as error:
-        raise GenerateError(f"cannot read {options.lock_file}: {error}") from None
-
-
-def _write_lock(options: Options, old_text: str | None, new_text: str) -> None:
-    try:
-        with alone_in(options.lock_file.parent):
-            if _read_lock(options) != old_text:
-                raise GenerateError(f"another run has changed {options.lock_file}; run this one again")
-            replace_file(options.lock_file, new_text.encode())
-    except OSError as error:
-        raise GenerateError(f"cannot write {options.lock_file}: {error.strerror}") from error

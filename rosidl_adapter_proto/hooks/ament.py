@@ -11,6 +11,7 @@ those of a ROS that came as binaries. `install` installs these. What fails is an
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from typing import Any
 import rosidl_adapter_proto
 from rosidl_adapter_proto.errors import Error, GenerateError
 from rosidl_adapter_proto.generate import Options, Request, check_definitions, generate
+from rosidl_adapter_proto.generate.lock import is_kept
 from rosidl_adapter_proto.generate.manifest import read_manifest
 from rosidl_adapter_proto.generate.output_tree import install
 from rosidl_adapter_proto.generate.outputs import places
@@ -136,14 +138,16 @@ def generate_package(build: Build) -> None:
     catalog = build.catalog()
     _check_dependencies(build, catalog)
     own = Request((build.package,), dependencies=False)
-    result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options)
+    renumber = is_kept(build.options)
+    result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options, renumber=renumber)
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
     needed = {name.package for name in result.interfaces} - {build.package}
     missing = tuple(sorted(needed - _provided(build, catalog)))
     folder = build.output / DEPENDENCIES_FOLDER
     if missing or read_manifest(folder) is not None:
-        generate(Request(missing, dependencies=False), catalog, folder, build.options)
+        others = Request(missing, dependencies=False)
+        generate(others, catalog, folder, build.options, renumber=renumber)
     _write_depfile(build)
 
 
@@ -194,9 +198,12 @@ def _write_depfile(build: Build) -> None:
     if build.options.numbering == SequentialNumbering.name:
         needs.append(build.options.lock_file)
     stamp = build.output / STAMP_FILE
-    target, *files = [str(file).replace(" ", r"\ ") for file in (stamp, *filter(Path.exists, needs))]
-    (build.output / DEPFILE).write_text(f"{target}: " + " \\\n  ".join(files) + "\n", encoding="utf-8")
-    stamp.touch()
+    target, *files = [str(file).replace(" ", r"\ ") for file in (stamp, *filter(os.path.exists, needs))]
+    try:
+        (build.output / DEPFILE).write_text(f"{target}: " + " \\\n  ".join(files) + "\n", encoding="utf-8")
+        stamp.touch()
+    except OSError as error:
+        raise GenerateError(f"cannot write to {build.output}: {error.strerror} ({error.filename})") from None
 
 
 def install_dependencies(build: Build) -> None:

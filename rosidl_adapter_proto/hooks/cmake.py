@@ -6,6 +6,7 @@ ROS looks for generators in its ament index: every interface package that is bui
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -37,7 +38,7 @@ def install_hook(prefix: Path) -> list[Path]:
     Raises:
         GenerateError: The prefix is none, or cannot be written.
     """
-    if not (prefix / "share" / "ament_index").is_dir():
+    if not os.path.isdir(prefix / "share" / "ament_index"):
         raise GenerateError(
             f"{prefix} is not a prefix of ROS packages: it has no share/ament_index; give one of those in "
             "AMENT_PREFIX_PATH, of a workspace one such as install/<package>"

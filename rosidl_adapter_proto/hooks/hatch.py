@@ -9,7 +9,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.plugin import hookimpl
 
-from rosidl_adapter_proto.errors import RequestError
+from rosidl_adapter_proto.errors import GenerateError, RequestError
 from rosidl_adapter_proto.generate.configuration import SECTION, read_configuration
 from rosidl_adapter_proto.hooks.project import generate_project
 
@@ -33,7 +33,12 @@ class RosidlProtoBuildHook(BuildHookInterface[Any]):
                 f"{Path(self.root, 'pyproject.toml')} has the build hook {self.PLUGIN_NAME}, but no [{SECTION}], "
                 "which says what to generate"
             )
-        self._temporary = TemporaryDirectory()
+        try:
+            self._temporary = TemporaryDirectory()
+        except OSError as error:
+            raise GenerateError(
+                f"cannot make a temporary folder: {error.strerror}; set TMPDIR to another folder"
+            ) from error
         project = generate_project(configuration, Path(self._temporary.name))
         for kind in ("force_include", "force_include_editable"):
             build_data[kind][str(project.root_folder)] = project.python_root

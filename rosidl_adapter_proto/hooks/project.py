@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rosidl_adapter_proto.generate import Request, generate
 from rosidl_adapter_proto.generate.configuration import Configuration
+from rosidl_adapter_proto.generate.lock import is_kept
 from rosidl_adapter_proto.generate.outputs import SHARED_FOLDERS
 
 
@@ -57,7 +58,7 @@ def generate_project(configuration: Configuration, output: Path) -> GeneratedPro
     # Other projects may install the same package, and Python takes all of it from one of them: so it comes whole.
     packages = dict.fromkeys((*request.packages, *(name.package for name in request.types)))
     whole = Request(tuple(packages), dependencies=request.dependencies)
-    result = generate(whole, catalog, output, options)
+    result = generate(whole, catalog, output, options, renumber=is_kept(options))
     for warning in result.warnings:
         print(f"Warning: {warning}", file=sys.stderr)
     return GeneratedProject(output, options.python_root)

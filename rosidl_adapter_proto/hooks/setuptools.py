@@ -68,7 +68,24 @@ def _build_py(base: type[build_py], folder: Path) -> type[build_py]:
             self.__dict__.pop("data_files", None)
             super().run()
 
+        def get_source_files(self) -> list[str]:
+            """Return the sources, with the lock file: without it, builds from them would make up other numbers."""
+            return [*super().get_source_files(), *_lock_files(folder)]
+
     return BuildPy
+
+
+def _lock_files(folder: Path) -> list[str]:
+    """Return the lock file of a project, if it has one in its folder."""
+    from rosidl_adapter_proto.errors import RequestError
+    from rosidl_adapter_proto.generate.configuration import read_configuration
+
+    try:
+        configuration = read_configuration(folder)
+    except RequestError:
+        return []  # whoever builds is told
+    file = os.path.relpath(configuration.values["lock-file"]) if configuration else ""
+    return [file] if os.path.isfile(file) and not file.startswith(os.pardir) else []
 
 
 def _develop(base: Any, folder: Path) -> Any:

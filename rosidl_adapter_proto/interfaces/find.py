@@ -224,12 +224,12 @@ def prefix_sources() -> list[Source]:
     sources: list[Source] = []
     for prefix in prefixes():
         share = prefix / "share"
-        if not share.is_dir():
+        if not os.path.isdir(share):
             continue
         origin = f"ROS prefix {prefix}"
         packages = {
             entry.name: package
-            for entry in sorted(os.scandir(share), key=lambda each: each.name)
+            for entry in _scan(share)
             if _is_package(entry) and (package := _read_package(Path(entry.path), entry.name, origin))
         }
         if packages:
@@ -294,11 +294,11 @@ def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
     entries = _entries(folder, seen)
     if not entries:
         return
-    if _has_manifest(folder) or any(each.name in NAMESPACES and each.is_dir() for each in entries):
+    if _has_manifest(folder) or any(each.name in NAMESPACES and os.path.isdir(each) for each in entries):
         yield folder
         return
     for each in entries:
-        if each.is_dir() and not each.name.startswith("."):
+        if os.path.isdir(each) and not each.name.startswith("."):
             yield from _package_folders(Path(each.path), seen)
 
 
@@ -310,7 +310,7 @@ def _package_folder_of(file: Path) -> Path | None:
 
 
 def _has_manifest(folder: Path) -> bool:
-    return (folder / "package.xml").is_file()
+    return os.path.isfile(folder / "package.xml")
 
 
 def _entries(folder: Path, seen: set[str]) -> list[os.DirEntry[str]]:
@@ -323,16 +323,20 @@ def _entries(folder: Path, seen: set[str]) -> list[os.DirEntry[str]]:
     if real_path in seen:
         return []
     seen.add(real_path)
+    entries = _scan(folder)
+    return [] if any(each.name in _IGNORE_MARKERS for each in entries) else entries
+
+
+def _scan(folder: Path) -> list[os.DirEntry[str]]:
     try:
-        entries = sorted(os.scandir(folder), key=lambda each: each.name)
+        return sorted(os.scandir(folder), key=lambda each: each.name)
     except OSError as error:
         raise _unreadable(folder, error) from None
-    return [] if any(each.name in _IGNORE_MARKERS for each in entries) else entries
 
 
 def _package_name(folder: Path) -> str:
     manifest = folder / "package.xml"
-    if not manifest.is_file():
+    if not os.path.isfile(manifest):
         return folder.resolve().name
     try:
         name = (ElementTree.parse(manifest).getroot().findtext("name") or "").strip()
@@ -366,9 +370,9 @@ def _files(folder: Path, seen: set[str]) -> Iterator[Path]:
     for each in _entries(folder, seen):
         path = Path(each.path)
         yield path
-        if not each.is_dir() or each.name.startswith(".") or each.name in _TEST_FOLDERS:
+        if not os.path.isdir(each) or each.name.startswith(".") or each.name in _TEST_FOLDERS:
             continue
-        if not any((path / marker).is_file() for marker in _FOREIGN_MARKERS):
+        if not any(os.path.isfile(path / marker) for marker in _FOREIGN_MARKERS):
             yield from _files(path, seen)
 
 

@@ -229,9 +229,10 @@ def _field_conversion(field: ProtoField, packed_indices: Mapping[int, int]) -> F
     zero = ZEROS[element.family]
     if not element.repeated:
         all_at_once = COMPACT_VALUES[element.family](field)
+        # What is counted is what ROS has: some characters of text are two in ROS.
         values = BothWays(
             length.to_custom + all_at_once.to_custom,
-            length.to_ros + all_at_once.to_ros,
+            all_at_once.to_ros + length.to_ros,
         )
         return Compact(values, size, zero)
     return Values(VALUES[element.family](field), length, size, zero)

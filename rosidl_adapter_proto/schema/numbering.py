@@ -15,7 +15,9 @@ from itertools import count
 from typing import Any, Protocol
 
 from rosidl_adapter_proto.errors import SchemaError
-from rosidl_adapter_proto.interfaces.model import FieldType, Message
+from rosidl_adapter_proto.interfaces.catalog import near_misses
+from rosidl_adapter_proto.interfaces.model import FieldType, Message, Shape, TypeName, type_parts
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Scalar
 from rosidl_adapter_proto.schema.typemap import is_repeated, proto_type
 
 # Protobuf language guide (proto3), "Assigning Field Numbers".
@@ -24,7 +26,9 @@ FIRST_RESERVED, LAST_RESERVED = 19000, 19999
 _RESERVED_COUNT = LAST_RESERVED - FIRST_RESERVED + 1
 
 LOCK_FILE_NAME = "rosidl-proto.lock"
-_LOCK_VERSION = 1
+_LOCK_VERSION = 2
+_READ_VERSIONS = (1, 2)
+"""Lock files of version 1 have no ROS types."""
 
 
 def compute_proto_field_number(variable_name: str) -> int:
@@ -72,10 +76,17 @@ class HashNumbering:
 
 @dataclass
 class LockedField:
-    """What the lock file knows of a field: its number, and the type its bytes have."""
+    """What the lock file knows of a field.
+
+    Attributes:
+        number: Its number.
+        type: Its type in protobuf.
+        ros_type: Its type in ROS, without bounds and lengths, which may change; None if an old lock file had none.
+    """
 
     number: int
     type: str
+    ros_type: str | None = None
 
 
 @dataclass
@@ -92,6 +103,7 @@ class SequentialNumbering:
     Attributes:
         file: The path of the lock file, for messages.
         messages: Its content, by type name; `numbers` brings it up to date.
+        given: The numbers of each message that was asked for, those of removed fields included.
     """
 
     name = "sequential"
@@ -99,6 +111,7 @@ class SequentialNumbering:
     def __init__(self, file: str, messages: dict[str, LockedMessage]) -> None:
         self.file = file
         self.messages = messages
+        self.given: dict[str, dict[str, int]] = {}
 
     @classmethod
     def from_lock(cls, file: str, text: str | None) -> SequentialNumbering:
@@ -111,7 +124,7 @@ class SequentialNumbering:
             return cls(file, {})
         try:
             content = json.loads(text, object_pairs_hook=_unique)
-            if content["version"] != _LOCK_VERSION:
+            if content["version"] not in _READ_VERSIONS:
                 raise SchemaError(
                     f"{file} has version {content['version']}, this program reads version {_LOCK_VERSION}; "
                     "use the version of rosidl-proto that wrote it, or a newer one"
@@ -137,28 +150,60 @@ class SequentialNumbering:
             SchemaError: A field would reuse a number for values of another type.
         """
         locked = self.messages.setdefault(str(message.name), LockedMessage())
-        present = {each.name: _type_text(each.type) for each in message.fields}
+        present = {
+            each.name: (_proto_type_text(each.type), _ros_type_text(each.type)) for each in message.fields
+        }
         for name in [name for name in locked.fields if name not in present]:
             locked.removed[name] = locked.fields.pop(name)
-        for name, type_text in present.items():
+        for name, types in present.items():
             known = locked.fields.get(name) or locked.removed.get(name)
-            if known is not None and known.type != type_text:
-                raise SchemaError(
-                    f"{message.name}.{name}: {self.file} has number {known.number} for it with type "
-                    f"{known.type}, but its type is {type_text} now; a number cannot be used for another type: "
-                    "give the field a new name"
-                )
+            if known is not None and not _reads_alike(known, *types):
+                raise self._wrong_type(f"{message.name}.{name}", known, types[1])
             if name in locked.removed:
                 locked.fields[name] = locked.removed.pop(name)
         used = {each.number for each in (*locked.fields.values(), *locked.removed.values())}
-        for name, type_text in present.items():
-            if name not in locked.fields:
-                locked.fields[name] = LockedField(_next_number(used), type_text)
-                used.add(locked.fields[name].number)
-        return Numbers(
+        for name, types in present.items():
+            number = locked.fields[name].number if name in locked.fields else _next_number(used)
+            locked.fields[name] = LockedField(number, *types)
+            used.add(number)
+        numbers = Numbers(
             {name: locked.fields[name].number for name in present},
             {name: each.number for name, each in locked.removed.items()},
         )
+        self.given[str(message.name)] = {**numbers.fields, **numbers.reserved}
+        return numbers
+
+    def _wrong_type(self, name: str, known: LockedField, ros_type: str) -> SchemaError:
+        known_type = known.ros_type or f"{known.type} in protobuf"
+        return SchemaError(
+            f"{name}: {self.file} has number {known.number} for it with type {known_type}, but its type is "
+            f"{ros_type} now; a number cannot be used for another type: give the field a new name, or, if it was "
+            f"never released, run: rosidl-proto lock drop {name} --lock-file {self.file}"
+        )
+
+    def drop(self, name: str) -> dict[str, int]:
+        """Forget a field, as `std_msgs/msg/String.data`, or a whole message, and return the numbers that are free now.
+
+        Raises:
+            SchemaError: The lock file has none of that name.
+        """
+        message_name, dot, field_name = name.partition(".")
+        message = self.messages.get(message_name)
+        if message is None:
+            raise SchemaError(
+                f"{self.file} has no message {message_name!r}{near_misses(message_name, self.messages)}"
+            )
+        known = {**message.fields, **message.removed}
+        if not dot:
+            del self.messages[message_name]
+            return {each: locked.number for each, locked in known.items()}
+        if field_name not in known:
+            raise SchemaError(
+                f"{self.file} has no field {field_name!r} of {message_name}; it has {', '.join(known) or 'none'}"
+            )
+        message.fields.pop(field_name, None)
+        message.removed.pop(field_name, None)
+        return {field_name: known[field_name].number}
 
     def lock_text(self) -> str:
         """Return the content of the lock file: one field to a line, so that a review shows what changed."""
@@ -174,7 +219,12 @@ class SequentialNumbering:
 
 def _field_dict(fields: Mapping[str, LockedField]) -> dict[str, str]:
     by_number = sorted(fields.items(), key=lambda item: item[1].number)
-    return {name: f"{each.number} {each.type}" for name, each in by_number}
+    return {name: _field_text(each) for name, each in by_number}
+
+
+def _field_text(field: LockedField) -> str:
+    ros_type = f" ({field.ros_type})" if field.ros_type else ""
+    return f"{field.number} {field.type}{ros_type}"
 
 
 def _damaged(file: str, reason: str) -> SchemaError:
@@ -194,13 +244,21 @@ def _read_fields(content: Mapping[str, Any]) -> dict[str, LockedField]:
     fields = {}
     for name, text in content.items():
         match = _LOCKED_FIELD.fullmatch(text)
-        if match is None:
+        if match is None or not _fits(match[2], match[3]):
             raise ValueError(f"{name!r} has {text!r} instead of a number and a type")
-        fields[name] = LockedField(int(match[1]), match[2])
+        fields[name] = LockedField(int(match[1]), match[2], match[3])
     return fields
 
 
-_LOCKED_FIELD = re.compile(r"([0-9]{1,10}) ((?:repeated )?[A-Za-z0-9_.]+)")
+_LOCKED_FIELD = re.compile(r"([0-9]{1,10}) ((?:repeated )?[A-Za-z0-9_.]+)(?: \(([A-Za-z0-9_/ \[\]]+)\))?")
+
+
+def _fits(proto_type: str, ros_type: str | None) -> bool:
+    """Tell whether both can be types of one field: both of a message, or both of scalars."""
+    if ros_type is None:
+        return True
+    element = ros_type.removesuffix("[]")
+    return element.count("/") == 2 if "." in proto_type else element in _SCALARS
 
 
 def _check_numbers(file: str, name: str, message: LockedMessage) -> None:
@@ -233,7 +291,38 @@ def _next_number(used: set[int]) -> int:
     )
 
 
-def _type_text(field_type: FieldType) -> str:
+def _proto_type_text(field_type: FieldType) -> str:
     """What the bytes of a field depend on; bounds and array lengths may change."""
     repeated = "repeated " if is_repeated(field_type) else ""
     return repeated + proto_type(field_type).lstrip(".")
+
+
+def _ros_type_text(field_type: FieldType) -> str:
+    """What a type is called in `.msg`, or else in `.idl`, without bounds and array lengths."""
+    shape, element, _, _ = type_parts(field_type)
+    name = str(element) if isinstance(element, TypeName) else _scalar_name(element)
+    return name if shape is Shape.SINGLE else f"{name}[]"
+
+
+def _scalar_name(scalar: Scalar) -> str:
+    return scalar.msg[0] if scalar.msg else scalar.name
+
+
+_SCALARS = {_scalar_name(row): row for row in SCALARS.values()}
+
+
+def _reads_alike(known: LockedField, proto_type: str, ros_type: str) -> bool:
+    """Tell whether bytes of the type that a field had are values of the one that it has now."""
+    if known.type != proto_type:
+        return False
+    # protobuf's `bytes` are numbers with or without a sign, or wide characters.
+    return (
+        known.ros_type is None
+        or proto_type.removeprefix("repeated ") != "bytes"
+        or _meaning_of_bytes(known.ros_type) == _meaning_of_bytes(ros_type)
+    )
+
+
+def _meaning_of_bytes(ros_type: str) -> tuple[bool, bool]:
+    scalar = _SCALARS[ros_type.removesuffix("[]")]
+    return scalar.is_string, scalar.signed

@@ -60,7 +60,7 @@ def test_an_adapter_derived_from_one_in_use(things: SimpleNamespace) -> None:
 
 def test_a_class_that_only_adds_has_a_codec_of_its_own(part: Any) -> None:
     assert part.codec is not None
-    derived = type("Derived", (part,), {"more": 1})
+    derived: Any = type("Derived", (part,), {"more": 1})
     assert derived.codec is not part.codec
     assert derived.codec.message_class is part.custom_type
 
@@ -71,9 +71,10 @@ def test_no_codec_where_a_conversion_is_written_by_hand(part: Any, name: str, is
     if is_in_use:
         assert part.codec is not None
     by_hand = {name: staticmethod(lambda *arguments: None)}
-    own = type("Own", (part,), by_hand)
-    mixed_in = type("MixedIn", (type("Mixin", (), by_hand), part), {})
-    for adapter in (own, mixed_in, type("Derived", (own,), {})):
+    own: Any = type("Own", (part,), by_hand)
+    mixed_in: Any = type("MixedIn", (type("Mixin", (), by_hand), part), {})
+    derived: Any = type("Derived", (own,), {})
+    for adapter in (own, mixed_in, derived):
         assert adapter.codec is None
         assert adapter.transcoder is None
 
@@ -164,10 +165,10 @@ def test_without_a_codec_messages_go_through_the_conversions(things: SimpleNames
 def test_without_a_codec_rclpy_is_needed(
     things: SimpleNamespace, by_hand: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "rclpy.serialization", None)  # type: ignore[arg-type]
-    for call in (lambda: by_hand.to_cdr(things.msg.PartAdapter()), lambda: by_hand.from_cdr(b"")):
+    monkeypatch.setitem(sys.modules, "rclpy.serialization", None)
+    for call, given in ((by_hand.to_cdr, things.msg.PartAdapter()), (by_hand.from_cdr, b"")):
         with pytest.raises(RosNotFoundError) as caught:
-            call()
+            call(given)
         assert str(caught.value) == (
             f"{by_hand.__qualname__}: cannot import rclpy.serialization "
             "(import of rclpy.serialization halted; None in sys.modules); "
@@ -179,7 +180,8 @@ def test_methods_written_by_hand_can_use_those_of_the_base(things: SimpleNamespa
     class Framed(by_hand):  # type: ignore[misc]
         @classmethod
         def to_cdr(cls, source: Any) -> bytes:
-            return b"frame " + super().to_cdr(source)
+            data: bytes = super().to_cdr(source)
+            return b"frame " + data
 
     message = things.msg.PartAdapter(y=1)
     assert Framed.to_cdr(message) == b"frame " + by_hand.to_cdr(message)

@@ -31,7 +31,7 @@ ADVICE = "what generated modules need has changed: raise CONTRACT_VERSION, state
 def round_trip(generated: Path, code: int = 0) -> str:
     program = CONTRACT / "round_trip.py"
     path = os.pathsep.join(map(str, (generated, CHECKOUT)))
-    return run(sys.executable, program, folder=CONTRACT, code=code, PYTHONPATH=path)
+    return run(sys.executable, program, folder=CONTRACT, code=code, variables={"PYTHONPATH": path})
 
 
 def modules(folder: Path) -> dict[str, ast.Module]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pytest
 
+import rosidl_adapter_proto
 from tests.cli.conftest import Run
 from tests.folders import write_package
 
@@ -184,6 +184,7 @@ def test_every_command_is_listed(run: Run) -> None:
         "generate",
         "hook",
         "list",
+        "lock",
         "show",
     ]
 
@@ -199,12 +200,7 @@ def test_wrong_usage(arguments: list[str], run: Run) -> None:
 
 
 def test_version(run: Run) -> None:
-    try:
-        expected = version("rosidl-adapter-proto")
-    except PackageNotFoundError:
-        pytest.skip("needs the package to be installed")
-
-    assert run("--version").out == f"rosidl-proto, version {expected}\n"
+    assert run("--version").out == f"rosidl-proto, version {rosidl_adapter_proto.__version__}\n"
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

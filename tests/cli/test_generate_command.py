@@ -69,7 +69,8 @@ def test_two_definitions_of_one_name(folder: Path, run: Run) -> None:
 def test_verbose(my_msgs: Path, run: Run) -> None:
     ended = run("generate", "./src", "-v", "--output", "out", "--numbering", "sequential")
 
-    assert (ended.code, ended.err) == (0, "")
+    assert ended.code == 0
+    assert ended.err == "Warning: rosidl-proto.lock is new: it keeps the numbers of fields, so commit it\n"
     assert ended.out == (
         "my_msgs/msg/A from src/my_msgs/msg/A.msg\n"
         + lines("wrote", "out")
@@ -107,7 +108,7 @@ def test_sequential_numbers(my_msgs: Path, folder: Path, run: Run) -> None:
     assert run(*command).code == 0
     assert "bool a = 1;" in (folder / "generated/proto/my_msgs/msg/A.proto").read_text()
     assert json.loads((folder / "numbers.lock").read_text())["messages"]["my_msgs/msg/A"]["fields"] == {
-        "a": "1 bool"
+        "a": "1 bool (bool)"
     }
     before = content(folder)
 
@@ -116,8 +117,9 @@ def test_sequential_numbers(my_msgs: Path, folder: Path, run: Run) -> None:
 
     assert (refused.code, refused.out) == (3, "")
     assert refused.err == (
-        "Error: my_msgs/msg/A.a: numbers.lock has number 1 for it with type bool, but its type is sfixed32 now; "
-        "a number cannot be used for another type: give the field a new name\n"
+        "Error: my_msgs/msg/A.a: numbers.lock has number 1 for it with type bool, but its type is int32 now; "
+        "a number cannot be used for another type: give the field a new name, or, if it was never released, "
+        "run: rosidl-proto lock drop my_msgs/msg/A.a --lock-file numbers.lock\n"
     )
     (my_msgs / "msg" / "A.msg").write_text("bool a\n")
     assert content(folder) == before

@@ -64,6 +64,16 @@ def test_a_closed_pipe() -> None:
     assert (ended.returncode, ended.stderr) == (1, b"")
 
 
+def test_a_full_disk_behind_the_standard_output() -> None:
+    with Path("/dev/full").open("wb") as full:
+        ended = subprocess.run([*PROGRAM, "list"], stdout=full, stderr=subprocess.PIPE, check=False)
+
+    assert ended.returncode == 3
+    assert ended.stderr == (
+        b"Error: cannot write to the standard output: No space left on device; make room there\n"
+    )
+
+
 def run_on_terminal(*arguments: str) -> str:
     """Return what the program writes to a terminal."""
     leader, follower = pty.openpty()

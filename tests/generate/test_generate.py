@@ -18,7 +18,7 @@ import pytest
 import rosidl_adapter_proto
 from rosidl_adapter_proto.errors import DefinitionError, GenerateError, SchemaError
 from rosidl_adapter_proto.generate import Options, Request, Result, fingerprint, generate, output_tree, protoc
-from rosidl_adapter_proto.generate import run as run_module
+from rosidl_adapter_proto.generate import lock as lock_module
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME
 from rosidl_adapter_proto.generate.render import templates_folder
 from rosidl_adapter_proto.interfaces.catalog import Catalog
@@ -75,10 +75,11 @@ def run(
     *,
     deps: bool = True,
     check: bool = False,
+    renumber: bool = False,
 ) -> Result:
     """Generate from a folder of packages."""
     request = Request(tuple(packages), tuple(types), deps)
-    return generate(request, find(source), output, options, check=check)
+    return generate(request, find(source), output, options, check=check, renumber=renumber)
 
 
 def find(source: Path) -> Catalog:
@@ -401,7 +402,7 @@ class TestLockFile:
         assert run(source, output, PACKAGES, options=options).lock_changed
         lock = options.lock_file.read_text()
         assert json.loads(lock)["messages"]["base_msgs/msg/Point"] == {
-            "fields": {"x": "1 double", "y": "2 double"},
+            "fields": {"x": "1 double (float64)", "y": "2 double (float64)"},
             "removed": {},
         }
         assert not run(source, output, PACKAGES, options=options).lock_changed
@@ -415,11 +416,13 @@ class TestLockFile:
         assert "reserved 1;" in proto
 
     def test_it_is_what_counts(self, options: Options, source: Path, output: Path) -> None:
-        """A lock file that somebody changed makes the output stale."""
+        """A lock file that somebody changed makes the output stale; it has to be told that numbers may change."""
         run(source, output, PACKAGES, options=options)
         options.lock_file.write_text(options.lock_file.read_text().replace("2 double", "7 double"))
 
-        result = run(source, output, PACKAGES, options=options)
+        with pytest.raises(GenerateError, match=r"^base_msgs/msg/Point\.y has number 2 in "):
+            run(source, output, PACKAGES, options=options)
+        result = run(source, output, PACKAGES, options=options, renumber=True)
 
         assert not result.lock_changed
         assert "double y = 7;" in (output / "proto/base_msgs/msg/Point.proto").read_text()
@@ -472,7 +475,7 @@ class TestLockFile:
             raise OSError(errno.ENOSPC, "No space left on device")
 
         with monkeypatch.context() as patch:
-            patch.setattr(run_module, "replace_file", refuse)
+            patch.setattr(lock_module, "replace_file", refuse)
             with pytest.raises(GenerateError, match=r"^cannot write .*lock: No space left on device$"):
                 run(source, output, PACKAGES, options=options)
         assert content(output) == before
@@ -484,7 +487,7 @@ class TestLockFile:
             ):
                 run(source, output, PACKAGES, options=options)
         assert content(output) == before
-        assert '"new": "3 bool"' in options.lock_file.read_text()
+        assert '"new": "3 bool (bool)"' in options.lock_file.read_text()
         (source / "base_msgs/msg/Point.msg").write_text("int8 newer\nbool new\n" + POINT)
         run(source, output, PACKAGES, options=options)
         proto = (output / "proto/base_msgs/msg/Point.proto").read_text()
@@ -516,7 +519,7 @@ class TestLockFile:
         write_package(source / "base_msgs", {"msg/New.msg": "bool b\n"})
 
         with pytest.raises(GenerateError, match=r"New\.proto was not made by rosidl-proto"):
-            run(source, output, PACKAGES, options=options)
+            run(source, output, PACKAGES, options=options, renumber=True)
 
         assert not options.lock_file.exists()
 
@@ -651,3 +654,62 @@ def test_same_bytes_everywhere(seed: str, source: Path, generated: Path, tmp_pat
     )
 
     assert content(elsewhere / "cwd" / "out") == content(generated)
+
+
+def test_warnings_of_definitions(source: Path, output: Path) -> None:
+    file = source / "base_msgs" / "msg" / "Wide.msg"
+    file.write_text("wstring<=5[] x\n")
+    expected = (
+        f"{file}:1:1: ROS 2 takes the bound of these wide strings for that of the sequence too, and so it is "
+        "generated: at most 5 elements; give the sequence a bound of its own",
+    )
+    assert run(source, output).warnings == expected
+    assert run(source, output).warnings == ()  # a run with nothing to do parses nothing
+
+
+@pytest.mark.parametrize("length", [101, 400])
+def test_messages_that_are_nested_too_deep(length: int, tmp_path: Path, output: Path) -> None:
+    definitions = {f"msg/D{each}.msg": f"D{each + 1} x\n" for each in range(length - 1)}
+    source = write_package(tmp_path / "deep_msgs", {**definitions, f"msg/D{length - 1}.msg": "int8 x\n"})
+    outer, inner = f"D{length - 101}", f"D{length - 100}"
+    with pytest.raises(SchemaError) as caught:
+        run(source, output, ["deep_msgs"])
+    assert str(caught.value) == (
+        f"deep_msgs/msg/{outer}.x ({source}/msg/{outer}.msg:1:{len(inner) + 2}) nests messages more than 100 deep, "
+        f"which protobuf does not read; flatten deep_msgs/msg/{inner} or what is in it"
+    )
+    assert not output.exists()
+
+
+def test_control_characters_in_comments(tmp_path: Path, output: Path) -> None:
+    text = "# a\0b\n\nint8 x # \0\x1b\x7f [\x01]\nint8 Y=1 # \0\n"
+    source = write_package(tmp_path / "odd_msgs", {"msg/Odd.msg": text})
+    run(source, output, ["odd_msgs"])
+    texts = {path.suffix: path.read_text() for path in output.rglob("Odd*.p*") if path.name[-7:] != "_pb2.py"}
+    assert texts.keys() == {".proto", ".pyi", ".py"}
+    for each in texts.values():
+        assert "a␀b" in each
+        assert not set(each) & set(map(chr, (*range(9), *range(14, 32), 127)))
+    assert "␀␛␡" in texts[".proto"]
+
+
+def test_deep_and_wide_messages(tmp_path: Path, output: Path) -> None:
+    """A chain as long as it may be, and messages that each have the next three times."""
+    deep = {f"msg/D{each}.msg": f"D{each + 1} x\n" for each in range(99)}
+    wide = {f"msg/W{each}.msg": f"W{each + 1} a\nW{each + 1}[2] b\n" for each in range(30)}
+    last = {"msg/D99.msg": "int8 x 5\n", "msg/W30.msg": "int8 x\n"}
+    source = write_package(tmp_path / "large_msgs", {**deep, **wide, **last})
+    run(source, output, ["large_msgs"], options=Options(python_root="large_root"))
+    program = """if True:
+        import sys
+        from large_root.large_msgs.msg import D0Adapter, W0, W0Adapter
+        message = D0Adapter.new()
+        for _ in range(99):
+            message = message.x
+        assert message.x == 5
+        assert W0Adapter.new() == W0()
+        sizes = [len(each.type_description()["referenced_type_descriptions"]) for each in (D0Adapter, W0Adapter)]
+        assert sizes == [99, 30]
+    """
+    environment = {**os.environ, "PYTHONPATH": str(output / "python")}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True)

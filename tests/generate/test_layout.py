@@ -57,6 +57,9 @@ FORMS: Mapping[str, Form] = {
     "bytes": statement('message.N = numbers(exactly(source.N, 32), "B").tobytes()'),
     "unchecked bytes": statement('message.N = numbers(source.N, "B").tobytes()'),
     "packed": statement('message.MergeFromString(packed(149849856, numbers(exactly(source.N, 3), "f")))'),
+    "packed, hidden": statement(
+        'type(message).MergeFromString(message, packed(149849856, numbers(exactly(source.N, 3), "f")))'
+    ),
     "varints": statement('message.N.extend(numbers(at_most(source.N, 3), "h").tolist())'),
     "fill": statement('fill_array(message.N, array_of(arrays[12], "f"))'),
     "fill from elements": statement('fill_array(message.N, elements(source.N, "h"))'),

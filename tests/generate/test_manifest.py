@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate.manifest import (
     MANIFEST_NAME,
     Manifest,
+    SequentialNumbers,
     digest,
     is_intact,
     read_manifest,
@@ -22,10 +24,11 @@ MANIFEST = Manifest(
     "f00d", (TypeName("my_msgs", "msg", "A"), TypeName("my_msgs", "srv", "B")), {"proto/a": digest(b"a")}
 )
 CONTENT: dict[str, Any] = {
-    "version": 1,
+    "version": 2,
     "fingerprint": "f00d",
     "interfaces": ["my_msgs/msg/A", "my_msgs/srv/B"],
     "outputs": {"proto/a": digest(b"a")},
+    "numbers": None,
 }
 
 
@@ -35,6 +38,18 @@ def test_it_is_written_and_read(tmp_path: Path) -> None:
     assert json.loads(MANIFEST.to_json()) == CONTENT
     assert MANIFEST.to_json().endswith(b"\n}\n")
     assert read_manifest(tmp_path) == MANIFEST
+
+
+def test_sequential_numbers(tmp_path: Path) -> None:
+    numbers = SequentialNumbers("../rosidl-proto.lock", {"my_msgs/msg/A": {"a": 1, "gone": 2}})
+    manifest = replace(MANIFEST, numbers=numbers)
+    (tmp_path / MANIFEST_NAME).write_bytes(manifest.to_json())
+
+    assert json.loads(manifest.to_json())["numbers"] == {
+        "lock_file": "../rosidl-proto.lock",
+        "fields": {"my_msgs/msg/A": {"a": 1, "gone": 2}},
+    }
+    assert read_manifest(tmp_path) == manifest
 
 
 def test_there_is_none(tmp_path: Path) -> None:
@@ -53,7 +68,12 @@ def test_there_is_none(tmp_path: Path) -> None:
         (b'{"version": 1', "Expecting ',' delimiter: line 1 column 14 (char 13)"),
         (b"[]", "list indices must be integers or slices, not str"),
         (b"{}", "'version'"),
-        ({"version": 2}, "it has version 2, not 1"),
+        ({"version": 1}, "it has version 1, not 2"),
+        ({"numbers": 3}, "'int' object is not subscriptable"),
+        (
+            {"numbers": {"lock_file": "l", "fields": {"m": {"a": "x"}}}},
+            "invalid literal for int() with base 10: 'x'",
+        ),
         ({"outputs": 3}, "'int' object is not iterable"),
         ({"outputs": {"/etc/passwd": ""}}, "it names '/etc/passwd', which is not inside the folder"),
         ({"outputs": {"../a": ""}}, "it names '../a', which is not inside the folder"),

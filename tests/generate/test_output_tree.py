@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import signal
 import subprocess
@@ -14,7 +15,6 @@ from pathlib import Path
 import pytest
 
 from rosidl_adapter_proto.errors import GenerateError
-from rosidl_adapter_proto.generate import output_tree
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME, Manifest, read_manifest
 from rosidl_adapter_proto.generate.output_tree import (
     STAGING_NAME,
@@ -174,6 +174,41 @@ def test_a_link_in_the_place_of_ours_is_replaced_not_followed(output: Path, tmp_
 
     assert files_in(output) == OLD
     assert (tmp_path / "target").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("files", [NEW, OLD, {}], ids=["new", "same", "none"])
+def test_nothing_is_changed_behind_a_link(files: dict[str, bytes], output: Path, tmp_path: Path) -> None:
+    """A folder of ours that somebody replaced by a link: what is there is theirs, even if it has our names."""
+    theirs = tmp_path / "theirs"
+    (output / "proto" / "q").rename(theirs)
+    (theirs / "r" / "c").write_bytes(b"theirs")
+    link = output / "proto" / "q"
+    link.symlink_to(theirs)
+    before = content(tmp_path)
+
+    for attempt in (changes, put):
+        with pytest.raises(GenerateError) as error:
+            attempt(output, files)
+
+        assert str(error.value) == (
+            f"{link} is a symbolic link, and rosidl-proto changes nothing outside {output}; "
+            "remove the link, or choose another folder with --output"
+        )
+        assert content(tmp_path) == before
+    link.unlink()
+    put(output, files)
+    assert files_in(output) == files
+
+
+def test_what_python_cached_behind_a_link_stays(tmp_path: Path) -> None:
+    output = tmp_path / "out"
+    put(output, {"a/m.py": b""})
+    make_file(tmp_path / "theirs" / "m.cpython-311.pyc")
+    (output / "a" / "__pycache__").symlink_to(tmp_path / "theirs")
+
+    put(output, {})
+
+    assert content(tmp_path / "theirs") == {"m.cpython-311.pyc": b"mine"}
 
 
 def test_the_output_folder_may_be_a_link(output: Path, tmp_path: Path) -> None:
@@ -405,7 +440,7 @@ def test_without_locks(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(descriptor: int, operation: int) -> None:
         raise OSError(errno.EBADF, "Bad file descriptor")
 
-    monkeypatch.setattr(output_tree.fcntl, "flock", refuse)
+    monkeypatch.setattr(fcntl, "flock", refuse)
 
     put(output, NEW)
 
@@ -415,11 +450,12 @@ def test_without_locks(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_while_moving_the_manifest_knows_both(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Manifest | None] = []
     unlink = Path.unlink
-    monkeypatch.setattr(
-        Path,
-        "unlink",
-        lambda path, missing_ok=False: (seen.append(read_manifest(output)), unlink(path))[1],
-    )
+
+    def look_and_unlink(path: Path, missing_ok: bool = False) -> None:
+        seen.append(read_manifest(output))
+        unlink(path)
+
+    monkeypatch.setattr(Path, "unlink", look_and_unlink)
 
     put(output, NEW)
 

@@ -102,7 +102,12 @@ def test_generate_command(option: Setting, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize("option", [each for each in OPTIONS if each.is_for_schema])
 def test_show_command(option: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
     received: list[Options] = []
-    monkeypatch.setattr(show_command, "proto_text", lambda *given: received.append(given[-1]) or "")
+
+    def record(*given: Any) -> str:
+        received.append(given[-1])
+        return ""
+
+    monkeypatch.setattr(show_command, "proto_text", record)
     value = other(option)
 
     with pytest.raises(SystemExit):
@@ -160,7 +165,7 @@ def test_what_changes_the_output_is_noticed(option: Setting, folder: Path) -> No
     generate(request, catalog, folder / "out")
     options = set_to(option, other(option))
 
-    result = generate(request, catalog, folder / "out", options, check=True)
+    result = generate(request, catalog, folder / "out", options, check=True, renumber=True)
 
     assert result.is_stale == option.changes_output
     package = generated_packages(catalog.packages["my_msgs"], catalog, options)["my_msgs"]

@@ -43,8 +43,7 @@ class Project:
             *arguments,
             folder=self.folder if program == "pip" else self.environment,
             code=code,
-            PIP_FIND_LINKS=self._wheels,
-            PIP_DISABLE_PIP_VERSION_CHECK="1",
+            variables={"PIP_FIND_LINKS": self._wheels, "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
         )
 
 
@@ -62,7 +61,7 @@ def test_the_document(backend: str, wheel: Path, tmp_path: Path) -> None:
 
     commands = re.sub("^pip wheel .*$", "", commands, flags=re.MULTILINE)
     path = os.pathsep.join([str(environment / "bin"), os.environ["PATH"]])
-    run("bash", "-euc", commands, folder=tmp_path, PATH=path)
+    run("bash", "-euc", commands, folder=tmp_path, variables={"PATH": path})
 
     assert run(environment / "bin/python", "-c", USE, folder=environment) == "track_msgs.msg.pb.Track\n"
 

@@ -202,7 +202,7 @@ class Workspace:
         # The stand-in would mix with a ROS that there is.
         packages = ("rosidl_generator_py", "ament_cmake_python")
         alone = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{package}=ON" for package in packages]
-        arguments = {
+        arguments: dict[str, list[str | Path]] = {
             "configure": ["-S", self.folder, "-B", build, f"-DROSIDL_PROTO_PYTHON={sys.executable}", *alone],
             "build": ["--build", build],
             "install": ["--install", build, "--prefix", self.prefix],

@@ -71,7 +71,9 @@ class Workspace:
 
     def run(self, script: str) -> str:
         """Run a shell script where the workspace is sourced, and return what it prints."""
-        return run("bash", "-ec", f"source install/setup.bash\n{script}", folder=self.folder, **environment())
+        return run(
+            "bash", "-ec", f"source install/setup.bash\n{script}", folder=self.folder, variables=environment()
+        )
 
     @contextmanager
     def node(self, name: str, domain: int) -> Iterator[subprocess.Popen[str]]:
@@ -134,7 +136,7 @@ def test_the_document(tmp_path: Path) -> None:
     document = (ROOT / "docs" / "build-colcon.md").read_text(encoding="utf-8")
     (commands,) = re.findall(r"^```sh\n(.*?)^```", document, re.MULTILINE | re.DOTALL)
 
-    printed = run("bash", "-ec", commands, folder=tmp_path, **environment())
+    printed = run("bash", "-ec", commands, folder=tmp_path, variables=environment())
 
     assert re.search(r"^track_msgs .* adapters in .*/install/track_msgs$", printed, re.MULTILINE)
 
@@ -279,7 +281,7 @@ def test_options(workspace: Workspace) -> None:
     assert lock_file.read_bytes() == before
 
     # As by a change of the lock file that comes from somebody else.
-    lock_file.write_bytes(before.replace(b'"2 fixed32"', b'"9 fixed32"'))
+    lock_file.write_bytes(before.replace(b'"2 fixed32 ', b'"9 fixed32 '))
     workspace.build()
     proto = workspace.folder / "install/track_msgs/share/track_msgs/msg/Track.proto"
     assert "fixed32 id = 9;" in proto.read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -70,3 +71,17 @@ def test_build_and_source_distribution(project: Path) -> None:
 
     assert (project / "build/lib/rosidl_proto/builtin_interfaces/msg/Time_pb2.py").is_file()
     assert b"Time_pb2" not in (project / "dist/some-1.2.3.tar").read_bytes()
+
+
+def test_the_lock_file_is_a_source(project: Path) -> None:
+    (project / "setup.cfg").write_text(
+        "[tool.rosidl-proto]\npackages = builtin_interfaces\nnumbering = sequential\nlock-file = numbers.lock\n"
+    )
+    setup(project, "sdist", "--formats", "tar")
+    setup(project, "build")
+
+    setup(project, "sdist", "--formats", "tar", "--dist-dir", "again")
+
+    for folder, is_there in (("dist", False), ("again", True)):
+        with tarfile.open(project / folder / "some-1.2.3.tar") as sources:
+            assert ("some-1.2.3/numbers.lock" in sources.getnames()) == is_there

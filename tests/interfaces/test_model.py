@@ -27,7 +27,8 @@ UUID = TypeName("unique_identifier_msgs", "msg", "UUID")
 INT8 = BasicType("int8")
 
 SERVICE = Service(DO, Message(DO.sibling("_Request"), ()), Message(DO.sibling("_Response"), ()))
-ACTION = Action(GO, *(Message(GO.sibling(each), ()) for each in ("_Goal", "_Result", "_Feedback")))
+GOAL, RESULT, FEEDBACK = (Message(GO.sibling(each), ()) for each in ("_Goal", "_Result", "_Feedback"))
+ACTION = Action(GO, GOAL, RESULT, FEEDBACK)
 
 
 def test_type_names() -> None:

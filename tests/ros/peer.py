@@ -94,7 +94,7 @@ class Other:
         Until it starts, it sends the same feedback.
         """
         ours = kind == "protobuf"
-        server = (rosidl_adapter_proto.ros if ours else rclpy.action).ActionServer  # type: ignore[attr-defined]
+        server = (rosidl_adapter_proto.ros if ours else rclpy.action).ActionServer
         fibonacci: Any = examples.ros_class("test_msgs/action/Fibonacci")
         if ours:
             from rosidl_proto.test_msgs import action as fibonacci_types
@@ -127,8 +127,8 @@ class Other:
             self.type(kind, "test_msgs/action/Fibonacci"),
             name,
             execute,
-            goal_callback=lambda goal: rclpy.action.GoalResponse(2 if goal.order >= 0 else 1),
-            cancel_callback=lambda goal_handle: rclpy.action.CancelResponse.ACCEPT,
+            goal_callback=lambda goal: rclpy.action.server.GoalResponse(2 if goal.order >= 0 else 1),
+            cancel_callback=lambda goal_handle: rclpy.action.server.CancelResponse.ACCEPT,
             callback_group=rclpy.callback_groups.ReentrantCallbackGroup(),
         )
 

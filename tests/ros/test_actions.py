@@ -108,7 +108,7 @@ def acting(node: Any, fibonacci: Any) -> Iterator[Callable[..., tuple[Any, Any]]
 
 def test_callbacks_of_a_server(acting: Any, fibonacci: Any) -> None:
     """Callbacks get protobuf messages, whether they are given at first or later, functions or coroutines."""
-    from rclpy.action import CancelResponse, GoalResponse
+    from rclpy.action.server import CancelResponse, GoalResponse
 
     goal_class, seen = fibonacci.goal.custom_type, []
 

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import functools
+import json
 import queue
+import sys
 import threading
 from collections.abc import Callable
-from types import SimpleNamespace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -105,7 +108,8 @@ def test_adapters_of_other_protobuf_classes(node: Any, adapter: Any) -> None:
         descriptor = pool.FindMessageTypeByName(name)
         if hasattr(message_factory, "GetMessageClass"):
             return message_factory.GetMessageClass(descriptor)
-        return message_factory.MessageFactory(pool).GetPrototype(descriptor)  # before protobuf 4.22
+        factory: Any = message_factory.MessageFactory(pool)
+        return factory.GetPrototype(descriptor)  # before protobuf 4.22
 
     pool = descriptor_pool.DescriptorPool()
     file = descriptor_pb2.FileDescriptorProto(name="mine/Text.proto", package="mine", syntax="proto3")
@@ -241,6 +245,44 @@ def test_a_type_without_description(node: Any, adapter: Any) -> None:
     assert "no type description share/std_msgs/msg/Unknown.json in a folder above" in warnings[0]
 
 
+@pytest.mark.parametrize(
+    ("type_name", "file"),
+    [
+        ("pkg/msg/My_Type", "msg/My_Type"),
+        ("pkg/msg/My_Type", "msg/My_Type_"),
+        ("pkg/srv/My_Service_Request", "srv/My_Service"),
+        ("pkg/action/My_Action_SendGoal_Request", "action/My_Action"),
+        ("pkg/msg/My", "msg/My"),
+    ],
+)
+def test_names_with_underscores(
+    type_name: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each file of the package describes one type, and `My.json` another than the one that is asked for."""
+    from rosidl_adapter_proto.ros.type_hash import TypeHashError, _installed_type_hash, check_type_hash
+
+    for path, described in (("msg/My", "pkg/msg/My"), (file, type_name)):
+        place = tmp_path / "share" / "pkg" / f"{path}.json"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(json.dumps({"type_hashes": [{"type_name": described, "hash_string": "RIHS01_1"}]}))
+    module = ModuleType("pkg")
+    module.__file__ = str(tmp_path / "lib" / "pkg" / "__init__.py")
+    monkeypatch.setitem(sys.modules, "pkg", module)
+    _installed_type_hash.cache_clear()
+    warnings: list[str] = []
+    adapter: Any = SimpleNamespace(type_name=type_name, type_hash="RIHS01_0")
+    logger: Any = SimpleNamespace(warning=warnings.append)
+    try:
+        if file.endswith("_"):  # a file that cannot be the type's
+            check_type_hash(adapter, SimpleNamespace(__module__="pkg.msg"), logger)
+            assert len(warnings) == 1
+            return
+        with pytest.raises(TypeHashError, match=rf"^{type_name}: .*/share/pkg/{file}\.json has RIHS01_1; "):
+            check_type_hash(adapter, SimpleNamespace(__module__="pkg.msg"), logger)
+    finally:
+        _installed_type_hash.cache_clear()
+
+
 # --- Publishers ---
 
 
@@ -319,7 +361,8 @@ def test_context_managers(ros: None, adapter: Any, text: Any) -> None:
 
     if not hasattr(rclpy.node.Node, "__enter__"):
         pytest.skip("this rclpy has no context managers")
-    trigger = examples.adapter("std_srvs/srv/Trigger")
+    trigger: Any = examples.adapter("std_srvs/srv/Trigger")
+    client: Any
     with (
         Node("managed") as node,
         node.create_publisher(adapter, "managed", 10) as publisher,
@@ -347,8 +390,8 @@ def test_a_publisher_class_of_the_user(node: Any, adapter: Any, text: Any) -> No
 
     publisher = node.create_publisher(adapter, "counting", 10, publisher_class=Counting)
     publisher.publish(text("one"))
-    assert isinstance(publisher, (Counting, rosidl_adapter_proto.ros.Publisher))
     assert publisher.count == 1
+    assert isinstance(publisher, (Counting, rosidl_adapter_proto.ros.Publisher))
 
 
 # --- Subscriptions ---
@@ -583,7 +626,8 @@ def test_executors(ros: None, adapter: Any, text: Any, name: str) -> None:
     spin_until(action_client.server_is_ready)
     goal = action_client.send_goal_async(fibonacci.goal.custom_type(order=5))
     executor.spin_until_future_complete(goal, timeout_sec=SECONDS)
-    result = goal.result().get_result_async()
+    accepted: Any = goal.result()
+    result: Any = accepted.get_result_async()
     executor.spin_until_future_complete(result, timeout_sec=SECONDS)
     assert result.result().result == fibonacci.result.custom_type(sequence=[5])
 

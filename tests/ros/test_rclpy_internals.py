@@ -31,12 +31,12 @@ import rclpy.service
 import rclpy.subscription
 import rclpy.task
 import rclpy.time
-from builtin_interfaces.msg import Duration, Time  # type: ignore[import-untyped]
+from builtin_interfaces.msg import Duration, Time
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.serialization import serialize_message
-from std_msgs.msg import String  # type: ignore[import-untyped]
-from std_srvs.srv import SetBool  # type: ignore[import-untyped]
-from test_msgs.action import Fibonacci  # type: ignore[import-untyped]
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+from test_msgs.action import Fibonacci
 
 ROS = ROOT / "rosidl_adapter_proto" / "ros"
 NOT_ASSUMPTIONS = ("test_each_line_has_a_test", "test_no_other_module_touches_private_parts")

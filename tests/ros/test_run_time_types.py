@@ -75,11 +75,12 @@ def test_an_action_client(peer: Peer, node: Any) -> None:
     feedback: queue.Queue[Any] = queue.Queue()
     client = ActionClient(node, adapter, "made_action")
     assert client.wait_for_server(SECONDS)
-    future = client.send_goal_async(adapter.goal.custom_type(order=5), feedback.put)
+    future: Any = client.send_goal_async(adapter.goal.custom_type(order=5), feedback.put)
     wait_until(future.done, "the answer to a goal")
     assert list(feedback.get(timeout=SECONDS).feedback.sequence) == [0]
     peer.ask("proceed")
-    result = future.result().get_result_async()
+    accepted: Any = future.result()
+    result = accepted.get_result_async()
     peer.ask("proceed")
     wait_until(result.done, "a result")
     assert result.result().status == SUCCEEDED
@@ -102,7 +103,7 @@ def test_an_action_server(node: Any, native_node: Any) -> None:
         return adapter.result.custom_type(sequence=[goal_handle.request.order])
 
     server = ActionServer(node, adapter, "served_action", execute)
-    client = rclpy.action.ActionClient(native_node, native, "served_action")
+    client: Any = rclpy.action.client.ActionClient(native_node, native, "served_action")
     assert client.wait_for_server(SECONDS)
     result = client.send_goal(native.Goal(order=3))
     assert (result.status, list(result.result.sequence)) == (SUCCEEDED, [3])

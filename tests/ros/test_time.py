@@ -18,7 +18,7 @@ from tests.ros import examples
 
 pytest.importorskip("rclpy", reason="needs rclpy: pip install '.[ros]', or source a ROS 2 installation")
 
-import builtin_interfaces.msg  # type: ignore[import-untyped]
+import builtin_interfaces.msg
 import rclpy.duration
 import rclpy.time
 from rclpy.clock import Clock

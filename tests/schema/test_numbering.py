@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -18,6 +20,7 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
 )
+from rosidl_adapter_proto.interfaces.scalars import SCALARS
 from rosidl_adapter_proto.schema.numbering import (
     LARGEST_NUMBER,
     HashNumbering,
@@ -42,7 +45,12 @@ TYPES: dict[str, FieldType] = {
     "int32[4]": ArrayType(BasicType("int32"), 4),
     "int32[<=4]": SequenceType(BasicType("int32"), 4),
     "uint8[]": SequenceType(BasicType("uint8")),
+    "int8[]": SequenceType(BasicType("int8")),
+    "octet[]": SequenceType(BasicType("octet")),
+    "long_double": BasicType("long double"),
+    "long_double[]": SequenceType(BasicType("long double")),
     "Bar": TypeName("pkg", "msg", "Bar"),
+    "Bar[]": SequenceType(TypeName("pkg", "msg", "Bar")),
     "Baz": TypeName("pkg", "msg", "Baz"),
 }
 
@@ -156,6 +164,7 @@ def sequence(*steps: str, lock: str | None = None) -> tuple[Numbers, str]:
         # Types whose values have the same bytes
         (["a:int8", "a:int16"], {"a": 1}, {}),
         (["a:uint8", "a:octet"], {"a": 1}, {}),
+        (["a:uint8[]", "a:octet[]"], {"a": 1}, {}),
         (["a:string", "a:string<=3"], {"a": 1}, {}),
         (["a:int32[]", "a:int32[3]", "a:int32[4]", "a:int32[<=4]"], {"a": 1}, {}),
     ],
@@ -170,12 +179,19 @@ def test_sequential_numbers(steps: list[str], fields: dict[str, int], reserved: 
 @pytest.mark.parametrize(
     ("steps", "was", "is_now"),
     [
-        (["a", "a:string"], "sfixed32", "string"),
-        (["a:string", "a:wstring"], "string", "bytes"),
-        (["a", "a:int32[]"], "sfixed32", "repeated sfixed32"),
-        (["a:uint8", "a:uint8[]"], "uint32", "bytes"),
-        (["a:Bar", "a:Baz"], "pkg.msg.pb.Bar", "pkg.msg.pb.Baz"),
-        (["b a", "b", "b a:string"], "sfixed32", "string"),  # removed in between
+        (["a", "a:string"], "int32", "string"),
+        (["a:string", "a:wstring"], "string", "wstring"),
+        (["a", "a:int32[]"], "int32", "int32[]"),
+        (["a:uint8", "a:uint8[]"], "uint8", "uint8[]"),
+        (["a:Bar", "a:Baz"], "pkg/msg/Bar", "pkg/msg/Baz"),
+        (["a:Bar", "a:Bar[]"], "pkg/msg/Bar", "pkg/msg/Bar[]"),
+        (["a:long_double", "a:long_double[]"], "long double", "long double[]"),
+        (["b a", "b", "b a:string"], "int32", "string"),  # removed in between
+        # All of these are bytes in protobuf.
+        (["a:uint8[]", "a:int8[]"], "uint8[]", "int8[]"),
+        (["a:int8[]", "a:octet[]"], "int8[]", "byte[]"),
+        (["a:wstring", "a:uint8[]"], "wstring", "uint8[]"),
+        (["a:octet[]", "a:wstring"], "byte[]", "wstring"),
     ],
 )
 def test_a_number_is_not_used_for_another_type(steps: list[str], was: str, is_now: str) -> None:
@@ -184,8 +200,28 @@ def test_a_number_is_not_used_for_another_type(steps: list[str], was: str, is_no
         sequence(*steps)
     assert str(caught.value) == (
         f"pkg/msg/Foo.a: {LOCK} has number {number} for it with type {was}, but its type is {is_now} now; "
-        "a number cannot be used for another type: give the field a new name"
+        "a number cannot be used for another type: give the field a new name, or, if it was never released, "
+        f"run: rosidl-proto lock drop pkg/msg/Foo.a --lock-file {LOCK}"
     )
+
+
+@pytest.mark.parametrize("name", [*SCALARS, "Bar"])
+@pytest.mark.parametrize("shape", [SequenceType, lambda type_: type_], ids=["many", "one"])
+def test_every_type_is_read_as_it_was_written(name: str, shape: Callable[[Any], FieldType]) -> None:
+    """Whatever an interface can have, its lock file is read again, and serves the same type."""
+    element: FieldType = BasicType(name) if name in SCALARS else FOO
+    if name in ("string", "wstring"):
+        element = StringType(wide=name == "wstring")
+    foo = Message(FOO, (Field("a", shape(element)),))
+    numbering = SequentialNumbering.from_lock(LOCK, None)
+    numbering.numbers(foo)
+    text = numbering.lock_text()
+    assert text.count("(") == 1
+
+    again = SequentialNumbering.from_lock(LOCK, text)
+
+    assert again.numbers(foo).fields == {"a": 1}
+    assert again.lock_text() == text
 
 
 def test_the_lock_file() -> None:
@@ -194,28 +230,79 @@ def test_the_lock_file() -> None:
     numbering.numbers(message("c a:Bar b:uint8[] gone"))
     numbering.numbers(message("c d:string a:Bar b:uint8[]"))
     assert numbering.lock_text() == """{
-  "version": 1,
+  "version": 2,
   "messages": {
     "pkg/msg/Foo": {
       "fields": {
-        "c": "1 sfixed32",
-        "a": "2 pkg.msg.pb.Bar",
-        "b": "3 bytes",
-        "d": "5 string"
+        "c": "1 sfixed32 (int32)",
+        "a": "2 pkg.msg.pb.Bar (pkg/msg/Bar)",
+        "b": "3 bytes (uint8[])",
+        "d": "5 string (string)"
       },
       "removed": {
-        "gone": "4 sfixed32"
+        "gone": "4 sfixed32 (int32)"
       }
     },
     "pkg/srv/Do_Request": {
       "fields": {
-        "z": "1 sfixed32"
+        "z": "1 sfixed32 (int32)"
       },
       "removed": {}
     }
   }
 }
 """
+
+
+def test_a_lock_file_of_version_1() -> None:
+    """It has no ROS types. Fields get theirs when they are numbered; what was removed has none."""
+    old = lock_of('{"a": "1 sfixed32", "b": "2 bytes"}', '{"gone": "3 bytes"}')
+
+    numbers, lock = sequence("a b:wstring", lock=old)
+
+    assert numbers == Numbers({"a": 1, "b": 2}, {"gone": 3})
+    assert json.loads(lock) == {
+        "version": 2,
+        "messages": {
+            "pkg/msg/Foo": {
+                "fields": {"a": "1 sfixed32 (int32)", "b": "2 bytes (wstring)"},
+                "removed": {"gone": "3 bytes"},
+            }
+        },
+    }
+    with pytest.raises(
+        SchemaError, match=r" has number 2 for it with type bytes in protobuf, but its type is "
+    ):
+        sequence("a b", lock=old)
+
+
+def test_dropped_entries() -> None:
+    numbering = SequentialNumbering.from_lock(LOCK, sequence("a b c", "b c")[1])
+
+    assert numbering.drop("pkg/msg/Foo.c") == {"c": 3}
+    assert numbering.drop("pkg/msg/Foo.a") == {"a": 1}
+    assert sequence("b a:string c", lock=numbering.lock_text())[0] == Numbers({"b": 2, "a": 3, "c": 4})
+    assert numbering.drop("pkg/msg/Foo") == {"b": 2}
+    assert numbering.messages == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("pkg/msg/Fo", f"{LOCK} has no message 'pkg/msg/Fo'; did you mean pkg/msg/Foo?"),
+        ("other/msg/Bar.a", f"{LOCK} has no message 'other/msg/Bar'"),
+        ("", f"{LOCK} has no message ''"),
+        ("pkg/msg/Foo.x", f"{LOCK} has no field 'x' of pkg/msg/Foo; it has a, b"),
+        ("pkg/msg/Foo.", f"{LOCK} has no field '' of pkg/msg/Foo; it has a, b"),
+    ],
+)
+def test_dropping_what_is_not_there(name: str, error: str) -> None:
+    numbering = SequentialNumbering.from_lock(LOCK, sequence("a b", "a")[1])
+
+    with pytest.raises(SchemaError) as caught:
+        numbering.drop(name)
+
+    assert str(caught.value) == error
 
 
 def test_the_lock_file_does_not_depend_on_the_order_of_messages() -> None:
@@ -273,6 +360,10 @@ DAMAGED = [
     (lock_of('{"a": 1}'), "it is not a lock file of rosidl-proto"),
     (lock_of('{"a": "sfixed32"}'), "'a' has 'sfixed32' instead of a number and a type"),
     (lock_of('{"a": "1"}'), "'a' has '1' instead of a number and a type"),
+    (lock_of('{"a": "1 bytes (u8[])"}'), "'a' has '1 bytes (u8[])' instead of a number and a type"),
+    (lock_of('{"a": "1 bytes (p/msg/A)"}'), "'a' has '1 bytes (p/msg/A)' instead of a number and a type"),
+    (lock_of('{"a": "1 p.msg.pb.A (A)"}'), "'a' has '1 p.msg.pb.A (A)' instead of a number and a type"),
+    (lock_of('{"a": "1 bytes ()"}'), "'a' has '1 bytes ()' instead of a number and a type"),
     (lock_of('{"a": "-1 sfixed32"}'), "'a' has '-1 sfixed32' instead of a number and a type"),
     (lock_of('{"a": "0 sfixed32"}'), "pkg/msg/Foo.a has number 0, which protobuf does not allow"),
     (lock_of('{"a": "19000 sfixed32"}'), "pkg/msg/Foo.a has number 19000, which protobuf does not allow"),
@@ -300,9 +391,9 @@ def test_damaged_lock_files(text: str, reason: str) -> None:
 
 def test_a_lock_file_of_another_version() -> None:
     with pytest.raises(SchemaError) as caught:
-        SequentialNumbering.from_lock(LOCK, '{"version": 2}')
+        SequentialNumbering.from_lock(LOCK, '{"version": 3}')
     assert str(caught.value) == (
-        f"{LOCK} has version 2, this program reads version 1; "
+        f"{LOCK} has version 3, this program reads version 2; "
         "use the version of rosidl-proto that wrote it, or a newer one"
     )
 

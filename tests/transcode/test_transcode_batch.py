@@ -144,7 +144,7 @@ def test_errors_found_while_writing(threads: int) -> None:
         "test/msg/String.data at byte 2 of message 1: the text is not valid UTF-8;"
         " encode it as UTF-8, or use bytes for what is not text"
     ]
-    assert (batch[0], batch[2]) == (GOOD, GOOD)
+    assert batch[0] == batch[2] == GOOD
     with pytest.raises(TranscodeError, match="of message 1:"):
         batch[1]
 
@@ -170,7 +170,8 @@ def test_an_empty_result_is_not_an_error() -> None:
 
 def test_batch_is_a_sequence() -> None:
     batch = strings().cdr_to_proto_batch([GOOD] * 3)
-    assert (len(batch), batch[-1], batch[-3]) == (3, GOOD_PROTO, GOOD_PROTO)
+    assert len(batch) == 3
+    assert batch[-1] == batch[-3] == GOOD_PROTO
     for index in (3, -4):
         with pytest.raises(IndexError):
             batch[index]
@@ -240,7 +241,11 @@ def test_buffer_of_the_messages() -> None:
     transcode = strings()
     memory = bytearray(GOOD + bytes(50))
     message, rest = memoryview(memory)[:10], memoryview(memory)[10:]
-    for messages, into in (([message], memory), ([GOOD, message], memoryview(memory)[9:])):
+    cases: list[tuple[list[bytes | memoryview], bytearray | memoryview]] = [
+        ([message], memory),
+        ([GOOD, message], memoryview(memory)[9:]),
+    ]
+    for messages, into in cases:
         with pytest.raises(ValueError, match="`into` is memory of the messages; give other memory"):
             transcode.cdr_to_proto_batch(messages, into=into)
     with pytest.raises(ValueError, match="`into` is memory of the messages"):
@@ -316,7 +321,7 @@ def test_ranges(form: str) -> None:
     values = [13, 23, 2, 12, 2, 12, 23, 23]
     batch = strings().cdr_to_proto_batch(buffer, ranges=RANGES[form](values))
     assert list(batch.errors) == [0, 3]
-    assert (batch[1], batch[2]) == (GOOD_PROTO, GOOD_PROTO)
+    assert batch[1] == batch[2] == GOOD_PROTO
     assert "of message 3: a CDR message begins with a header of 4 bytes and this one has 0" in str(
         batch.errors[3]
     )
@@ -398,7 +403,7 @@ def test_batch_arguments() -> None:
     with pytest.raises(TypeError, match="a bytes-like object is required, not 'int'"):
         transcode.cdr_to_proto_batch(GOOD)  # one message is no batch
     with pytest.raises(TypeError, match="a bytes-like object is required, not 'list'"):
-        transcode.cdr_to_proto_batch([GOOD], ranges=array.array("Q", [0, 10]))  # type: ignore[arg-type]
+        transcode.cdr_to_proto_batch([GOOD], ranges=array.array("Q", [0, 10]))
 
 
 def test_large_messages() -> None:
@@ -416,7 +421,7 @@ def test_large_messages() -> None:
 def test_size_limit_is_of_one_message() -> None:
     transcode, _ = transcoder(STRING, "test/msg/String", hashed=False, size_limit=3)
     batch = transcode.cdr_to_proto_batch([GOOD, b"\0\1\0\0\3\0\0\0ab\0", GOOD])
-    assert (batch[0], batch[2]) == (GOOD_PROTO, GOOD_PROTO)
+    assert batch[0] == batch[2] == GOOD_PROTO
     assert str(batch.errors[1]) == (
         "test/msg/String at byte 11 of message 1: the result would have more than 3 bytes;"
         " split the message or raise the size limit"

@@ -6,12 +6,14 @@ import contextlib
 import random
 import struct
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from google.protobuf.descriptor import FieldDescriptor
 from reference_cdr import write_cdr
 from ros_types import describe, nasty_types, protobuf_class, random_value, struct_type
 
+from rosidl_adapter_proto.interfaces.model import Shape
 from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, SCALARS, CdrForm
 from rosidl_adapter_proto.transcode import TranscodeError, _core
 from rosidl_adapter_proto.transcode.plan import (
@@ -19,7 +21,6 @@ from rosidl_adapter_proto.transcode.plan import (
     MessagePlan,
     Operation,
     Plan,
-    Shape,
     build_plan,
 )
 
@@ -31,29 +32,29 @@ def load(given: Plan | bytes) -> _core.Transcoder:
     return _core.Transcoder(packed, "test/msg/A", 1 << 20)
 
 
-def number(name: str, scalar: str, field_number: int = 1, **changes: object) -> Operation:
+def number(name: str, scalar: str, field_number: int = 1, **changes: Any) -> Operation:
     """An operation for a number."""
     row = SCALARS[scalar]
     assert row.cdr is not None
     protobuf = getattr(FieldDescriptor, f"TYPE_{row.protobuf.upper()}")
     operation = Operation(name, name, row.type_id, row.cdr, protobuf, field_number)
-    return replace(operation, **changes)  # type: ignore[arg-type]
+    return replace(operation, **changes)
 
 
-def nested(name: str, message: int, field_number: int = 1, **changes: object) -> Operation:
+def nested(name: str, message: int, field_number: int = 1, **changes: Any) -> Operation:
     """An operation for a nested message."""
     protobuf = FieldDescriptor.TYPE_MESSAGE
     operation = Operation(
         name, name, NESTED_TYPE_ID, CdrForm.MESSAGE, protobuf, field_number, message=message
     )
-    return replace(operation, **changes)  # type: ignore[arg-type]
+    return replace(operation, **changes)
 
 
 def plan(*messages: tuple[Operation, ...]) -> Plan:
     return Plan(tuple(MessagePlan("test/msg/A", "test.msg.pb.A", each) for each in messages))
 
 
-def one_field(**changes: object) -> Plan:
+def one_field(**changes: Any) -> Plan:
     return plan((number("x", "uint32", **changes),))
 
 
@@ -89,7 +90,7 @@ def test_plan_of_a_type() -> None:
 OTHER_VERSION = "the plan has another version than this core, which reads version 2; build it again"
 FORMS = "the plan has a field whose forms do not go together"
 
-WRONG = {
+WRONG: dict[str, tuple[Plan | bytes, str]] = {
     "nothing": (b"", "the plan does not begin as a plan does"),
     "another mark": (b"RPX2" + bytes(16), "the plan does not begin as a plan does"),
     "another version": (b"RPP1" + bytes(16), OTHER_VERSION),

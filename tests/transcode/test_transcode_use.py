@@ -110,7 +110,7 @@ def test_data_that_changes_meanwhile() -> None:
 
     thread = threading.Thread(target=disturb)
     thread.start()
-    outcomes = set()
+    outcomes: set[type] = set()
     for _ in range(200):
         try:
             outcomes.add(type(transcode.cdr_to_proto(cdr)))

@@ -27,6 +27,12 @@ from rosidl_adapter_proto.generate.settings import OPTIONS
 @setting_option("deps")
 @generate_options(OPTIONS)
 @click.option("--check", is_flag=True, help="Write nothing; exit with 1 and a list if anything is stale.")
+@click.option(
+    "--renumber",
+    is_flag=True,
+    help="Let fields get other numbers than OUTPUT was generated with: what was serialized with it cannot be read "
+    "any more.",
+)
 @click.option("--verbose", "-v", is_flag=True, help="List every file and where definitions come from.")
 @source_options
 @click.pass_context
@@ -37,6 +43,7 @@ def command(
     deps: bool,
     options: Options,
     check: bool,
+    renumber: bool,
     verbose: bool,
     include: tuple[Path, ...],
     distro: str | None,
@@ -53,7 +60,9 @@ def command(
         )
     request, catalog = find_request(what, include, distro, deps)
     with _progress() as progress:
-        result = generate(request, catalog, output, options, check=check, progress=progress)
+        result = generate(
+            request, catalog, output, options, check=check, renumber=renumber, progress=progress
+        )
     for warning in result.warnings:
         click.echo(f"Warning: {warning}", err=True)
     if verbose:

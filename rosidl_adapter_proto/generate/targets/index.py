@@ -8,6 +8,7 @@ package was built without protobuf types, since they could not be made.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,12 +136,22 @@ def _unreadable(prefix: Path, name: str, error: Exception) -> GenerateError:
     )
 
 
+def _resources(folder: Path) -> list[str]:
+    try:
+        return sorted(os.listdir(folder))
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+    except OSError as error:
+        raise GenerateError(
+            f"cannot read {folder}: {error.strerror}; take its prefix off AMENT_PREFIX_PATH"
+        ) from None
+
+
 def installed_packages(prefixes: Iterable[Path]) -> Mapping[str, InstalledPackage]:
     """Return every package that is installed, from the first prefix that has it; errors as of `installed_package`."""
     found: dict[str, InstalledPackage] = {}
     for prefix in prefixes:
-        folder = prefix / RESOURCE_FOLDER
-        for name in sorted(file.name for file in folder.iterdir()) if folder.is_dir() else ():
+        for name in _resources(prefix / RESOURCE_FOLDER):
             package = installed_package(prefix, name)
             if package is not None:
                 found.setdefault(name, InstalledPackage(prefix, package))

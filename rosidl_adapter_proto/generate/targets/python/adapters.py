@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.adapter.contract import constant_name
-from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines, plain_lines
-from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer
+from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines
+from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer, method
 from rosidl_adapter_proto.generate.targets.python.layout import quoted
 from rosidl_adapter_proto.generate.targets.python.names import Names
 from rosidl_adapter_proto.interfaces.model import Interface, TypeName
 from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
-from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoScalarValue
+from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoScalarValue, plain_lines
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,11 @@ class AdapterConstant:
 
 @dataclass(frozen=True)
 class MessageAdapter:
-    """The adapter class of one message."""
+    """The adapter class of one message.
+
+    Attributes:
+        set_in_parent: The call that makes the protobuf message present where it is nested.
+    """
 
     class_name: str
     custom: str
@@ -56,6 +60,7 @@ class MessageAdapter:
     constants: tuple[AdapterConstant, ...]
     packed_numbers: tuple[int, ...]
     fields: tuple[AdapterField, ...]
+    set_in_parent: str
     defaults: tuple[tuple[str, str | tuple[str, ...]], ...]
     has_defaults: bool
 
@@ -104,7 +109,7 @@ def message_adapter(
 ) -> MessageAdapter:
     """Decide what the adapter of a message of an interface is."""
     conversion = message_conversion(proto)
-    lines = {field.name: writer.lines(field, how) for field, how in conversion.fields}
+    lines = {field.name: writer.lines(proto, field, how) for field, how in conversion.fields}
     return MessageAdapter(
         class_name=names.adapter(proto.type_name),
         custom=proto.name,
@@ -114,7 +119,9 @@ def message_adapter(
         ros_class=ros_class(proto.type_name, interface),
         comment=("", *comment) if (comment := docstring_lines(proto.source.comment)) else (),
         constants=tuple(
-            AdapterConstant(constant_name(each.name), _literal(each.value), plain_lines(each.comment))
+            AdapterConstant(
+                constant_name(each.name, proto.name), _literal(each.value), tuple(plain_lines(each.comment))
+            )
             for each in proto.constants
         ),
         packed_numbers=conversion.packed_numbers,
@@ -122,6 +129,7 @@ def message_adapter(
             AdapterField(each.name, _field_info(each, writer.adapter_names), *lines.get(each.name, ((), ())))
             for each in proto.fields
         ),
+        set_in_parent=method(proto, "SetInParent"),
         defaults=_defaults(proto),
         has_defaults=has_defaults(proto.source, names.catalog.message),
     )
