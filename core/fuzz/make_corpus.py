@@ -21,6 +21,8 @@ from ros_types import describe, nasty_types, protobuf_class, protobuf_message, r
 from rosidl_adapter_proto.transcode.plan import build_plan  # noqa: E402
 
 VALUES = 3
+GROUP = b"\x0b\x10\x05\x13\x14\x1a\x02ab\x0c"
+"""Field 1 as a group, with a number, text and another group in it."""
 CHOSEN = (
     ("test/msg/Nasty", ["f_double_one", "f_Inner_many.leaf.text", "f_wstring_array"]),
     ("test/msg/Nasty", ["f_Inner_many"]),
@@ -53,6 +55,7 @@ def main(directory: Path) -> None:
                 contents = {
                     "cdr": bytes((0, number)) + cdr,
                     "proto": bytes((1, number)) + proto,
+                    "groups": bytes((1, number)) + GROUP + proto + GROUP,
                     "plan_cdr": b"\2" + sized(plan) + cdr,
                     "plan_proto": b"\3" + sized(plan) + proto,
                 }

@@ -11,6 +11,7 @@
 #include <memory>
 #include <vector>
 
+#include "rosidl_adapter_proto/packed_fields.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 
@@ -152,6 +153,11 @@ std::vector<Plan> read_plans() {
 void run(const Plan& plan, bool is_cdr, Input message) {
   round_trip(plan, is_cdr, message);
   is_cdr ? change(plan, message) : change_proto(plan, message);
+  const uint64_t number = 1;
+  Slice slice;
+  const uint8_t* const end = message.data + message.size;
+  if (find_packed_fields(message.data, end, &number, 1, &slice))
+    check(slice.size <= message.size, "a field is larger than its message");
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
 #include <cstring>
 #include <deque>
 #include <rosidl_adapter_proto/packed_fields.hpp>
@@ -18,6 +19,9 @@ namespace {
 
 // From this size on, the time that it takes to give the interpreter lock away and back does not count.
 constexpr uint64_t kLarge = 64 * 1024;
+
+// So many choices of fields a codec remembers.
+constexpr size_t kMaximumChoices = 64;
 
 // The bytes of any contiguous Python buffer, kept alive and, if it can change its size, locked.
 class Buffer {
@@ -104,29 +108,14 @@ class Transcoder {
 
   template <class Direction>
   nb::object transcode(Input input) const {
+    if (input.size >= kLarge && !plan_.partial()) return transcode_large<Direction>(input);
+    // Chosen fields are often among the first, and what follows makes no difference: then this is no large
+    // message.
     Error error;
-    typename Direction::Scratch scratch(plan_);
-    uint64_t size = 0;
-    if (input.size < kLarge) {
-      if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) fail(error);
-      nb::object result = new_bytes(size);
-      if (!Direction::write(plan_, input, scratch, 0, output_of(result, size), error)) fail(error);
-      return result;
-    }
-    bool good;
-    {
-      nb::gil_scoped_release release;
-      good = Direction::measure(plan_, input, size_limit_, scratch, &size, error);
-    }
-    if (!good) fail(error);
-    nb::object result = new_bytes(size);
-    const Output output = output_of(result, size);
-    {
-      nb::gil_scoped_release release;
-      good = Direction::write(plan_, input, scratch, 0, output, error);
-    }
-    if (!good) fail(error);
-    return result;
+    nb::object result = transcode_small<Direction>({input.data, std::min(input.size, kLarge)}, error);
+    if (result.is_valid()) return result;
+    if (input.size < kLarge) fail(error);
+    return transcode_large<Direction>(input);
   }
 
   // Returns the buffer with the results, how much of it they take, their ranges, and the errors by index.
@@ -179,6 +168,39 @@ class Transcoder {
   }
 
  private:
+  // Transcodes what takes less time than giving the interpreter lock away; if there is an error, nothing is
+  // returned.
+  template <class Direction>
+  nb::object transcode_small(Input input, Error& error) const {
+    typename Direction::Scratch scratch(plan_);
+    uint64_t size = 0;
+    if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) return {};
+    nb::object result = new_bytes(size);
+    if (!Direction::write(plan_, input, scratch, 0, output_of(result, size), error)) return {};
+    return result;
+  }
+
+  template <class Direction>
+  nb::object transcode_large(Input input) const {
+    Error error;
+    typename Direction::Scratch scratch(plan_);
+    uint64_t size = 0;
+    bool good;
+    {
+      nb::gil_scoped_release release;
+      good = Direction::measure(plan_, input, size_limit_, scratch, &size, error);
+    }
+    if (!good) fail(error);
+    nb::object result = new_bytes(size);
+    const Output output = output_of(result, size);
+    {
+      nb::gil_scoped_release release;
+      good = Direction::write(plan_, input, scratch, 0, output, error);
+    }
+    if (!good) fail(error);
+    return result;
+  }
+
   static bool overlap(Input input, Output output) {
     const auto a = reinterpret_cast<uintptr_t>(input.data), b = reinterpret_cast<uintptr_t>(output.data);
     return a < b + output.size && b < a + input.size;
@@ -209,13 +231,23 @@ class Transcoder {
   uint64_t size_limit_;
 };
 
+// The object behind `self`. It is missing where a class derives from ours and does not call its `__init__`.
+template <class T>
+T& object_of(PyObject* self) {
+  if (!nb::inst_ready(self)) {
+    PyErr_SetString(PyExc_TypeError, "__init__ of the base class has not been called");
+    throw nb::python_error();
+  }
+  return *nb::inst_ptr<T>(self);
+}
+
 // The two directions from and to message objects. Python would do it in two lines, at twice the cost for
 // small messages.
 class Codec {
  public:
   Codec(nb::handle_t<Transcoder> transcoder, nb::object message_class)
       : owner_(nb::borrow(transcoder)),
-        transcoder_(nb::cast<const Transcoder&>(transcoder)),
+        transcoder_(object_of<Transcoder>(transcoder.ptr())),
         message_class_(std::move(message_class)),
         from_string_(message_class_.attr("FromString")),
         // The method of the class: protobuf looks every name up among the fields of a message first.
@@ -234,11 +266,46 @@ class Codec {
     return transcoder_.transcode<ProtoToCdr>(proto);
   }
 
-  nb::object from_cdr(nb::handle data) const {
-    return call(from_string_, transcoder_.transcode<CdrToProto>(data));
+  nb::object from_cdr(nb::handle self, nb::handle data, nb::handle fields) {
+    if (fields.is_none()) return call(from_string_, transcoder_.transcode<CdrToProto>(data));
+    const nb::object chosen = transcoder_of(self, fields);
+    return call(from_string_, object_of<Transcoder>(chosen.ptr()).transcode<CdrToProto>(data));
   }
 
  private:
+  // The transcoder of some fields. A program asks for the same few again and again, so each is made once.
+  nb::object transcoder_of(nb::handle self, nb::handle fields) {
+    // A text, which is a sequence of texts as well, is for Python to refuse.
+    const nb::object key = PyUnicode_Check(fields.ptr()) ? nb::borrow(fields) : names_of(fields);
+    PyObject* const known = PyDict_GetItemWithError(choices_.ptr(), key.ptr());
+    if (known != nullptr) return nb::borrow(known);
+    if (PyErr_Occurred() != nullptr) throw nb::python_error();
+    nb::object made = self.attr("_transcoder_of")(key);
+    if (!nb::isinstance<Transcoder>(made)) {
+      PyErr_SetString(PyExc_TypeError, "_transcoder_of() must return a Transcoder");
+      throw nb::python_error();
+    }
+    if (choices_.size() >= kMaximumChoices) choices_.clear();
+    choices_[key] = made;
+    return made;
+  }
+
+  static nb::object names_of(nb::handle fields) {
+    const auto refuse = [](const char* before, nb::handle found) {
+      PyErr_Format(PyExc_TypeError, "from_cdr() takes fields as a list of names, %s %s", before,
+                   Py_TYPE(found.ptr())->tp_name);
+      throw nb::python_error();
+    };
+    if (Py_TYPE(fields.ptr())->tp_iter == nullptr && !PySequence_Check(fields.ptr())) refuse("not", fields);
+    nb::object names = nb::steal(PySequence_Tuple(fields.ptr()));
+    if (!names.is_valid()) throw nb::python_error();
+    for (Py_ssize_t i = 0; i < PyTuple_GET_SIZE(names.ptr()); ++i) {
+      PyObject* const name = PyTuple_GET_ITEM(names.ptr(), i);
+      if (!PyUnicode_Check(name)) refuse("and one of these is", name);
+    }
+    return names;
+  }
+
   static nb::object call(nb::handle function, nb::handle argument) {
     nb::object result = nb::steal(PyObject_CallOneArg(function.ptr(), argument.ptr()));
     if (!result.is_valid()) throw nb::python_error();
@@ -248,6 +315,7 @@ class Codec {
   nb::object owner_;
   const Transcoder& transcoder_;  // of the owner
   nb::object message_class_, from_string_, serialize_;
+  nb::dict choices_;  // the transcoders of chosen fields
 };
 
 nb::tuple packed_fields(nb::handle serialize, nb::handle object, nb::args numbers) {
@@ -274,16 +342,6 @@ nb::tuple packed_fields(nb::handle serialize, nb::handle object, nb::args number
   return nb::borrow<nb::tuple>(result);
 }
 
-// The object behind `self`. It is missing where a class derives from ours and does not call its `__init__`.
-template <class T>
-const T& self_as(PyObject* self) {
-  if (!nb::inst_ready(self)) {
-    PyErr_SetString(PyExc_TypeError, "__init__ of the base class has not been called");
-    throw nb::python_error();
-  }
-  return *nb::inst_ptr<T>(self);
-}
-
 // Runs C++ that CPython calls: what it throws becomes the exception of Python.
 template <class Function>
 PyObject* called_from_python(Function function) noexcept {
@@ -301,23 +359,33 @@ PyObject* called_from_python(Function function) noexcept {
 
 template <class Direction>
 PyObject* transcode(PyObject* self, PyObject* data) {
-  return called_from_python([&] { return self_as<Transcoder>(self).transcode<Direction>(data); });
+  return called_from_python([&] { return object_of<Transcoder>(self).transcode<Direction>(data); });
 }
 
 PyObject* codec_to_cdr(PyObject* self, PyObject* message) {
-  return called_from_python([&] { return self_as<Codec>(self).to_cdr(self, message); });
+  return called_from_python([&] { return object_of<Codec>(self).to_cdr(self, message); });
 }
 
+// Takes `data` and then `fields`, the second one by name as well.
 PyObject* codec_from_cdr(PyObject* self, PyObject* const* arguments, Py_ssize_t count, PyObject* names) {
-  return called_from_python([&] {
-    const Codec& codec = self_as<Codec>(self);
-    if (count == 1 && names == nullptr) return codec.from_cdr(arguments[0]);
-    // With chosen fields, or wrong arguments: Python knows better.
-    const nb::object method = nb::handle(self).attr("_from_cdr");
-    nb::object message = nb::steal(PyObject_Vectorcall(method.ptr(), arguments, count, names));
-    if (!message.is_valid()) throw nb::python_error();
-    return message;
-  });
+  const Py_ssize_t named = names == nullptr ? 0 : PyTuple_GET_SIZE(names);
+  const auto is_named = [&](const char* name) {
+    return named == 1 && PyUnicode_CompareWithASCIIString(PyTuple_GET_ITEM(names, 0), name) == 0;
+  };
+  if (is_named("data"))
+    return PyErr_Format(PyExc_TypeError, "from_cdr() takes the data by position, as from_cdr(data)");
+  if (count == 0 && is_named("fields"))
+    return PyErr_Format(PyExc_TypeError,
+                        "from_cdr() takes the data and perhaps fields, but only fields were given");
+  if (count == 0 || count + named > 2)
+    return PyErr_Format(PyExc_TypeError,
+                        "from_cdr() takes the data and perhaps fields, but %zd arguments were given",
+                        count + named);
+  if (named == 1 && !is_named("fields"))
+    return PyErr_Format(PyExc_TypeError, "from_cdr() has no argument %R; give fields=[...] to choose some",
+                        PyTuple_GET_ITEM(names, 0));
+  PyObject* const fields = count + named == 2 ? arguments[1] : Py_None;
+  return called_from_python([&] { return object_of<Codec>(self).from_cdr(self, arguments[0], fields); });
 }
 
 // Methods as CPython itself has them: the cheapest to call, and unlike those of nanobind they have signatures

@@ -46,7 +46,8 @@ class CdrWriter:
             self.number("I", len(encoded))
             self.body += encoded
         elif name == "wstring":
-            units = struct.unpack(f"<{len(value.encode('utf-16-le')) // 2}H", value.encode("utf-16-le"))
+            encoded = value.encode("utf-16-le", "surrogatepass")
+            units = struct.unpack(f"<{len(encoded) // 2}H", encoded)
             self.number("I", len(units))
             for unit in units:
                 self.number("I", unit)

@@ -202,7 +202,7 @@ def transcoder(
 
 CHARACTERS = "abcdefgh XYZ09_/\u00e9\u00df\u20ac\u4e2d\U0001f600"
 SIZES = (0, 0, 1, 2, 3, 9)
-TEXT_PAIRS = {"char": (0xC3, 0xA9), "wchar": (0xD83D, 0xDE00)}
+PAIR = (0xD83D, 0xDE00)
 TEXT = 0.5
 
 
@@ -218,9 +218,8 @@ def _random_field(types: Types, field: dict[str, Any], rng: random.Random) -> An
     capacity = field["type"]["capacity"]
     size = capacity if kind == "array" else rng.choice(SIZES)
     size = min(size, capacity) if kind == "bounded" else size
-    if element_name(field) in TEXT_PAIRS and rng.random() < TEXT:
-        pair = TEXT_PAIRS[element_name(field)]
-        return [unit for _ in range(size // 2) for unit in pair] + [0x61] * (size % 2)
+    if element_name(field) == "wchar" and rng.random() < TEXT:
+        return [*PAIR * (size // 2), *[0x61] * (size % 2)]
     return [_random_element(types, field, rng, repeated=True) for _ in range(size)]
 
 
@@ -238,8 +237,8 @@ def _random_element(types: Types, field: dict[str, Any], rng: random.Random, rep
     if element in FLOATS:
         value = rng.choice((-0.0, float("inf"), float("-inf"), rng.uniform(-1e6, 1e6), rng.random()))
         return struct.unpack("f", struct.pack("f", value))[0] if element == "float" else value
-    if element in ("char", "wchar") and repeated:
-        return rng.choice((0x20, 0x41, 0x7A))
+    if element == "char" or (element == "wchar" and repeated):
+        return rng.choice((0x20, 0x41, 0x7F))
     bits = struct.calcsize(INTEGERS[element]) * 8
     low = -(1 << bits - 1) if INTEGERS[element].islower() else 0
     return rng.choice(
@@ -264,7 +263,7 @@ def protobuf_message(types: Types, name: str, value: Value, message: Message) ->
                 protobuf_message(types, nested, each, getattr(message, field_name).add())
         elif element in TEXT_OR_BYTES:
             raw = struct.pack(f"<{len(content)}{INTEGERS[element]}", *content)
-            text = {"char": "utf-8", "wchar": "utf-16-le"}.get(element)
+            text = {"char": "ascii", "wchar": "utf-16-le"}.get(element)
             setattr(message, field_name, raw.decode(text) if text else raw)
         else:
             getattr(message, field_name).extend(_protobuf_value(element, each) for each in content)
@@ -273,7 +272,7 @@ def protobuf_message(types: Types, name: str, value: Value, message: Message) ->
 
 def _protobuf_value(element: str, value: Any) -> Any:
     if element == "wstring":
-        return value.encode("utf-16-le")
+        return value.encode("utf-16-le", "surrogatepass")
     return bool(value) if element == "boolean" else value
 
 

@@ -209,12 +209,11 @@ class CdrReader {
 
   template <class F>
   bool check(const Operation& op, const CdrNumbers<F, kSwap>& numbers) {
-    if constexpr (F::kIsText && F::kSize == 1) {
-      return is_utf8(numbers.place(0), numbers.count()) ||
-             input_.fail(Reason::Utf8, numbers.place(0)) != nullptr;
-    } else if constexpr (F::kIsText) {
-      uint64_t pairs;
-      return check_utf16(numbers, &pairs);
+    if constexpr (F::kIsText && F::kTakesAll) {
+      const uint64_t alone = lone_surrogate(numbers);
+      if (alone == numbers.count()) return true;
+      error_.element = static_cast<int64_t>(alone);
+      return input_.fail(Reason::Utf16, numbers.place(alone)) != nullptr;
     } else if constexpr (!F::kTakesAll) {
       bool good = true;
       for (uint64_t i = 0; i < numbers.count(); ++i) good &= F::is_value(numbers[i]);
@@ -276,29 +275,19 @@ class CdrReader {
     return text.size <= op.string_bound || check_bound(op, text.data, utf8_code_points(text.data, text.size));
   }
 
-  bool check_wide(const Operation& op, const CdrUnits<kSwap>& wide) {
-    uint64_t pairs;
-    return check_utf16(wide, &pairs) && check_bound(op, wide.place(0), wide.count() - pairs);
+  // The code units of a wide string need not be text: ROS passes on any of them.
+  ROSIDL_PROTO_NO_INLINE bool check_wide(const Operation& op, const CdrUnits<kSwap>& wide) {
+    uint32_t all = 0;
+    for (uint64_t i = 0; i < wide.count(); ++i) all |= wide[i];
+    for (uint64_t i = 0; all > 0xffff && i < wide.count(); ++i) {
+      if (wide[i] > 0xffff) return input_.fail(Reason::WstringUnit, wide.place(i), wide[i]) != nullptr;
+    }
+    return wide.count() <= op.string_bound || check_bound(op, wide.place(0), utf16_characters(wide));
   }
 
   bool check_bound(const Operation& op, const uint8_t* p, uint64_t characters) {
     return characters <= op.string_bound ||
            input_.fail(Reason::StringBound, p, characters, op.string_bound) != nullptr;
-  }
-
-  template <class Units>
-  bool check_utf16(const Units& units, uint64_t* pairs) {
-    *pairs = 0;
-    for (uint64_t i = 0; i < units.count(); ++i) {
-      const uint32_t unit = units[i];
-      if (unit > 0xffff) return input_.fail(Reason::WstringUnit, units.place(i), unit) != nullptr;
-      if (!is_surrogate(unit)) continue;
-      if (!is_high_surrogate(unit) || i + 1 == units.count() || !is_low_surrogate(units[i + 1]))
-        return input_.fail(Reason::Utf16, units.place(i)) != nullptr;
-      ++*pairs;
-      ++i;
-    }
-    return true;
   }
 
   // Messages

@@ -38,8 +38,8 @@ const char* text_of(Reason reason) {
              "protobuf "
              "message";
     case Reason::WireGroup:
-      return "field number {a} is a group, which proto3 does not have; serialize the message with a proto3 "
-             "schema";
+      return "the group of field number {a} has no end, no beginning or too many groups inside; the data is "
+             "damaged or no protobuf message";
     case Reason::WirePacked:
       return "a packed field of {a} bytes does not hold whole elements of {b} bytes; the data is damaged or "
              "of "
@@ -57,7 +57,7 @@ const char* text_of(Reason reason) {
     case Reason::Utf8:
       return "the text is not valid UTF-8; encode it as UTF-8, or use bytes for what is not text";
     case Reason::Utf16:
-      return "the text is not valid UTF-16: a surrogate stands alone; encode the text as UTF-16LE";
+      return "half of a surrogate pair stands alone, which text in protobuf cannot hold; send both halves";
     case Reason::StringBound:
       return "the string has {a} characters and its bound is {b}; shorten it";
     case Reason::SequenceBound:

@@ -79,7 +79,7 @@ class ProtobufInput {
     return nullptr;
   }
 
-  // Reads any tag. `*op` is nullptr for an unknown field.
+  // Reads any tag. `*op` is nullptr for an unknown field, which a group always is.
   const uint8_t* tag(const Message& message, const uint8_t* p, const uint8_t* end, const Operation** op,
                      WireType* wire_type) {
     uint64_t value;
@@ -90,10 +90,13 @@ class ProtobufInput {
     if (value > 0xffffffff || number == 0) return fail(Reason::WireTag, p, number), nullptr;
     if (type > 5) return fail(Reason::WireType, p, number, type), nullptr;
     *wire_type = static_cast<WireType>(type);
-    if (*wire_type == WireType::GroupStart || *wire_type == WireType::GroupEnd) {
-      return fail(Reason::WireGroup, p, number), nullptr;
+    *op = nullptr;
+    if (*wire_type == WireType::GroupEnd) return fail(Reason::WireGroup, p, number), nullptr;
+    if (*wire_type == WireType::GroupStart) {
+      group_ = number;
+    } else {
+      *op = plan_.find(message, static_cast<uint32_t>(number));
     }
-    *op = plan_.find(message, static_cast<uint32_t>(number));
     return after;
   }
 
@@ -116,9 +119,10 @@ class ProtobufInput {
         if (after == nullptr) fail(Reason::WireVarint, p);
         return after;
       }
+      case WireType::GroupStart:
+        return rest_of_group(p, end);
       case WireType::Delimited:
-      case WireType::GroupStart:  // `tag` lets no groups through
-      case WireType::GroupEnd: {
+      case WireType::GroupEnd: {  // `tag` lets none through
         const uint8_t* const after = get_varint(p, end, &size);
         if (after == nullptr) return fail(Reason::WireVarint, p), nullptr;
         *data = p = after;
@@ -241,6 +245,12 @@ class ProtobufInput {
   };
 
  private:
+  ROSIDL_PROTO_NO_INLINE const uint8_t* rest_of_group(const uint8_t* p, const uint8_t* end) {
+    const uint8_t* const after = skip_group(p, end, group_);
+    if (after == nullptr) fail(Reason::WireGroup, p, group_);
+    return after;
+  }
+
   // A field that is not there has no place: then the error names that of its message.
   uint64_t offset(const uint8_t* p) const {
     const auto at = reinterpret_cast<uintptr_t>(p);
@@ -265,6 +275,7 @@ class ProtobufInput {
   const uint8_t* const origin_end_;
   Error& error_;
   uint64_t anchor_ = 0;
+  uint64_t group_ = 0;  // the field number of the group whose beginning was read last
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 // The rules of the protobuf specification that are hidden in the details: the last value of a field wins; a
 // field that is there several times is, for a submessage, all its pieces joined, and for a repeated field,
 // all its elements; repeated numbers may be packed or not, whatever the schema says; a field whose wire type
-// does not fit is unknown; unknown fields are skipped. Groups are refused: proto3 has none.
+// does not fit is unknown; unknown fields are skipped, and so are groups, which proto3 does not have.
 #pragma once
 
 #include "protobuf_input.hpp"
@@ -252,8 +252,10 @@ class ProtobufReader {
       found = F::kSize == 1 ? slot.value : utf16_units(slot.data, slot.value);
     }
     if (!check_count(field, found)) return failed();
-    if constexpr (kContent && F::kIsText && F::kSize == 1) {
-      if (!is_utf8(slot.data, slot.value)) return fail(Reason::Utf8, slot.data);
+    if constexpr (kContent && !F::kTakesAll && F::kIsText) {
+      for (uint64_t i = 0; i < slot.value; ++i) {
+        if (!F::is_value(slot.data[i])) return not_a_character(field, i);
+      }
     }
     return take(sink_.template numbers<F>(field.op, at, ProtobufNumbers<F>(input_, field, found)));
   }
@@ -313,6 +315,15 @@ class ProtobufReader {
     return Sink::failed(inner) ? inner : take(sink_.end(op, at, nested, inner));
   }
 
+  ROSIDL_PROTO_NO_INLINE At not_a_character(const ProtobufField& field, uint64_t index) {
+    const uint8_t* const p = field.slot.data + index;
+    uint32_t code_point;
+    if (next_code_point(p, field.slot.data + field.slot.value, &code_point) == nullptr)
+      return fail(Reason::Utf8, p);
+    input_.at_element(static_cast<int64_t>(index));
+    return fail(Reason::Range, p, code_point, static_cast<uint64_t>(field.op.cdr));
+  }
+
   // Strings
   // ----------------------------------------------------------------------------------------------------------
 
@@ -327,7 +338,8 @@ class ProtobufReader {
     } else {
       if (kSizes && text.size % 2 != 0) return fail(Reason::OddWstring, text.data, text.size);
       const ProtobufUnits units(text);
-      if (kContent && !check_wide(op, units)) return failed();
+      if (kSizes && units.count() > op.string_bound && !check_bound(op, text.data, utf16_characters(units)))
+        return failed();
       return take(sink_.wstring(op, at, element, units));
     }
   }
@@ -342,18 +354,6 @@ class ProtobufReader {
     // the first.
     return text.size == 0 || std::memchr(text.data, 0, static_cast<size_t>(text.size)) == nullptr ||
            input_.fail(Reason::NulInString, text.data);
-  }
-
-  bool check_wide(const Operation& op, const ProtobufUnits& units) {
-    uint64_t pairs = 0;
-    bool after_high = false;
-    for (uint64_t i = 0; i < units.count(); ++i) {
-      if (after_high != is_low_surrogate(units[i])) return input_.fail(Reason::Utf16, units.place(i));
-      after_high = is_high_surrogate(units[i]);
-      pairs += after_high;
-    }
-    if (after_high) return input_.fail(Reason::Utf16, units.place(units.count() - 1));
-    return check_bound(op, units.place(0), units.count() - pairs);
   }
 
   // Messages of fixed size

@@ -26,6 +26,29 @@ inline uint32_t join_surrogates(uint32_t high, uint32_t low) {
   return 0x10000 + ((high & 0x3ff) << 10) + (low & 0x3ff);
 }
 
+// The index of the first surrogate that is not half of a pair; the number of code units if there is none.
+template <class Units>
+uint64_t lone_surrogate(const Units& units) {
+  const uint64_t count = units.count();
+  for (uint64_t i = 0; i < count; ++i) {
+    if (!is_surrogate(units[i])) continue;
+    if (!is_high_surrogate(units[i]) || i + 1 == count || !is_low_surrogate(units[i + 1])) return i;
+    ++i;
+  }
+  return count;
+}
+
+// Characters of UTF-16: a pair is one, and so is a surrogate alone, as Python and its ROS messages count
+// them.
+template <class Units>
+uint64_t utf16_characters(const Units& units) {
+  uint64_t pairs = 0;
+  for (uint64_t i = 1; i < units.count(); ++i) {
+    pairs += is_low_surrogate(units[i]) && is_high_surrogate(units[i - 1]);
+  }
+  return units.count() - pairs;
+}
+
 inline unsigned utf8_size(uint32_t code_point) {
   return code_point < 0x80 ? 1 : code_point < 0x800 ? 2 : code_point < 0x10000 ? 3 : 4;
 }

@@ -73,7 +73,8 @@ TEST(forms_are_those_of_python) {
 #define ROSIDL_PROTO_FORM(name, number)                                          \
   text += std::to_string(number) + " " + form_name(CdrForm::name) + " " +        \
           std::to_string(static_cast<int>(Form<CdrForm::name>::kSingle)) + " " + \
-          std::to_string(static_cast<int>(Form<CdrForm::name>::kMany)) + "\n";
+          std::to_string(static_cast<int>(Form<CdrForm::name>::kMany)) + " " +   \
+          std::to_string(Form<CdrForm::name>::kLargestCharacter) + "\n";
   ROSIDL_PROTO_CDR_FORMS(ROSIDL_PROTO_FORM)
 #undef ROSIDL_PROTO_FORM
   CHECK_EQUAL(text, golden_file("forms"));

@@ -2,6 +2,7 @@
 #include "rosidl_adapter_proto/transcode.hpp"
 
 #include "checks.hpp"
+#include "rosidl_adapter_proto/packed_fields.hpp"
 
 namespace rosidl_proto::test {
 
@@ -88,6 +89,37 @@ TEST(errors_say_what_and_where) {
   CHECK_EQUAL(error,
               "header.stamp.nanosec at 8: 4 bytes are needed and 0 are left; the data is cut off or of "
               "another type");
+}
+
+TEST(groups_are_skipped) {
+  const Plan plan = golden_plan("image");
+  const Bytes cdr = random_cdr(plan, 3);
+  std::string error;
+  const Bytes proto = to_proto(plan, cdr, &error);
+  // Field 1 is a group with a number, text and another group in it.
+  const Bytes group = {0x0b, 0x10, 5, 0x1a, 2, 'a', 'b', 0x0b, 0x0c, 0x25, 1, 2, 3, 4, 0x0c};
+  Bytes with_groups = group;
+  with_groups.insert(with_groups.end(), proto.begin(), proto.end());
+  with_groups.insert(with_groups.end(), group.begin(), group.end());
+  CHECK(to_cdr(plan, with_groups, &error) == cdr);
+  CHECK_EQUAL(error, "");
+  for (size_t size = 1; size < group.size(); ++size) {
+    error.clear();
+    to_cdr(plan, Bytes(group.begin(), group.begin() + static_cast<std::ptrdiff_t>(size)), &error);
+    CHECK_EQUAL(error,
+                " at 1: the group of field number 1 has no end, no beginning or too many groups inside; the "
+                "data is damaged or no protobuf message");
+  }
+}
+
+TEST(packed_fields_are_found_between_groups) {
+  // Field 2 beside groups, one of which has a field 2 inside.
+  const Bytes proto = {0x0b, 0x12, 1, 7, 0x0c, 0x12, 2, 8, 9, 0x13, 0x14};
+  const uint64_t number = 2;
+  Slice slice, other;
+  CHECK(find_packed_fields(proto.data(), proto.data() + proto.size(), &number, 1, &slice));
+  CHECK(Bytes(slice.data, slice.data + slice.size) == (Bytes{8, 9}));
+  CHECK(!find_packed_fields(proto.data(), proto.data() + proto.size() - 1, &number, 1, &other));
 }
 
 TEST(an_empty_result_needs_no_memory) {

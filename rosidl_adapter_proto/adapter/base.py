@@ -203,7 +203,7 @@ class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
             if nested is None or not nested.has_defaults or info.name in fields:
                 continue
             if info.type_id == _NESTED:
-                getattr(message, info.name).CopyFrom(nested.new())
+                copy_message(nested.new(), getattr(message, info.name))
             elif info.type_id == _NESTED_ARRAY:
                 getattr(message, info.name).extend(nested.new() for _ in range(info.capacity))
         return message
@@ -222,6 +222,11 @@ class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
             "type_description": _individual_description(cls),
             "referenced_type_descriptions": [_individual_description(found[name]) for name in sorted(found)],
         }
+
+
+def copy_message(source: Message, destination: Message) -> None:
+    """Overwrite a protobuf message with another, which may have a field called `CopyFrom`."""
+    type(destination).CopyFrom(destination, source)
 
 
 # type_description_interfaces/msg/FieldType
@@ -250,6 +255,9 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
 class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
 
+    Those that are generated or made at run time also have the protobuf classes as `Request` and `Response`, as the ROS
+    class has its messages, and generated ones go by the name of the service alone as well.
+
     Attributes:
         request: Adapter of the request.
         response: Adapter of the response.
@@ -269,6 +277,9 @@ class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
 
 class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
+
+    Those that are generated or made at run time also have the protobuf classes as `Goal`, `Result` and `Feedback`, as
+    the ROS class has its messages, and generated ones go by the name of the action alone as well.
 
     Attributes:
         goal: Adapter of the goal.

@@ -6,6 +6,7 @@ needs. What is listed is only ever added to, with a new version, for as long as 
 
 from __future__ import annotations
 
+import keyword
 import sys
 from typing import Any
 
@@ -41,10 +42,54 @@ RESERVED_NAMES = frozenset(
 )
 """The attributes of an adapter class, which no constant of a message can be called; nor what begins with `_`."""
 
+RESERVED_IN_BODIES = frozenset({"adapter", "float", "staticmethod", "type", "typing", *keyword.kwlist})
+"""What has its meaning in the body of a generated adapter class; so have the message and the adapters of others."""
 
-def constant_name(name: str) -> str:
-    """Return the attribute that a constant of a message is called; an `.idl` may give it a name that is taken."""
-    return f"{name}_" if name in RESERVED_NAMES else name
+PROTOBUF_NAMES = frozenset(
+    {
+        "ByteSize",
+        "Clear",
+        "ClearExtension",
+        "ClearField",
+        "CopyFrom",
+        "DESCRIPTOR",
+        "DiscardUnknownFields",
+        "Extensions",
+        "FindInitializationErrors",
+        "FromString",
+        "HasExtension",
+        "HasField",
+        "IsInitialized",
+        "ListFields",
+        "MergeFrom",
+        "MergeFromString",
+        "ParseFromString",
+        "RegisterExtension",  # until protobuf 4
+        "SerializePartialToString",
+        "SerializeToString",
+        "SetInParent",
+        "UnknownFields",
+        "WhichOneof",
+    }
+)
+"""The public attributes of a protobuf message. A field of such a name hides it in objects, but not in the class."""
+
+
+def constant_name(name: str, message: str) -> str:
+    """Return the attribute that a constant of a message is called; an `.idl` may give it a name that is taken.
+
+    Args:
+        name: The name of the constant.
+        message: The name of the message.
+    """
+    plain = name.rstrip("_")  # `new_` becomes `new__`, since `new` becomes `new_`
+    is_taken = plain in RESERVED_NAMES or plain in RESERVED_IN_BODIES or plain.endswith("Adapter")
+    return f"{name}_" if is_taken or plain == message.rstrip("_") else name
+
+
+def is_plain_field(name: str) -> bool:
+    """Return whether a field can be written as an attribute, `message.name`, in code that type checkers accept."""
+    return not keyword.iskeyword(name) and name not in PROTOBUF_NAMES
 
 
 _stated: set[str] = set()

@@ -113,7 +113,7 @@ def _store_bytes(message: Any, field: ProtoField, values: Any) -> None:
 
 
 def _store_fixed(message: Any, field: ProtoField, values: Any) -> None:
-    message.MergeFromString(packed(field.number, values))
+    type(message).MergeFromString(message, packed(field.number, values))
 
 
 def _store_varints(message: Any, field: ProtoField, values: Any) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from rosidl_adapter_proto.adapter.base import CustomT, RosT, TypeAdapter
+from rosidl_adapter_proto.adapter.base import CustomT, RosT, TypeAdapter, copy_message
 from rosidl_adapter_proto.adapter.values import CONVERSION_ERRORS, absent_or_exactly, conversion_error, each
 from rosidl_adapter_proto.errors import ConversionError, wrong_message
 
@@ -20,7 +20,7 @@ def finish_custom(message: CustomT, destination: CustomT | None) -> CustomT:
     """Return a converted message, or overwrite the destination with it."""
     if destination is None:
         return message
-    destination.CopyFrom(message)
+    copy_message(message, destination)
     return destination
 
 

@@ -17,7 +17,7 @@ from rosidl_adapter_proto.adapter.messages import check_custom, finish_custom, f
 from rosidl_adapter_proto.adapter.values import CONVERSION_ERRORS, conversion_error
 from rosidl_adapter_proto.interfaces.description import TypeDescription
 from rosidl_adapter_proto.interfaces.model import Message, TypeName
-from rosidl_adapter_proto.schema.conversion import has_defaults, message_conversion, ros_class
+from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
 from rosidl_adapter_proto.schema.proto import ProtoMessage
 from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
 
@@ -85,7 +85,11 @@ def _innermost_first(description: TypeDescription) -> Iterable[TypeName]:
 
 def _group_adapter(registry: TypeRegistry, schema: Schema) -> Any:
     base = ServiceAdapter if "request" in schema.parts else ActionAdapter
-    return _class(schema, base, {part: _adapter(registry, each) for part, each in schema.parts.items()})
+    parts = {part: _adapter(registry, each) for part, each in schema.parts.items()}
+    custom_types = {
+        NAMED_PARTS[part]: each.custom_type for part, each in parts.items() if part in NAMED_PARTS
+    }
+    return _class(schema, base, {**parts, **custom_types})
 
 
 def _message_adapter(registry: TypeRegistry, schema: Schema, adapters: Mapping[TypeName, Any]) -> Any:
@@ -112,7 +116,7 @@ def _message_adapter(registry: TypeRegistry, schema: Schema, adapters: Mapping[T
                 if each.default is not None
             },
             "has_defaults": has_defaults(proto.source, lambda name: _source(registry[name])),
-            **{constant_name(name): value for name, value in schema.constants.items()},
+            **{constant_name(name, proto.name): value for name, value in schema.constants.items()},
             **_conversions(proto, adapters),
         },
     )
@@ -145,7 +149,7 @@ def _conversions(proto: ProtoMessage, adapters: Mapping[TypeName, Any]) -> dict[
     packed_numbers = conversion.packed_numbers
 
     def fill_custom(source: Any, message: Any) -> None:
-        message.SetInParent()
+        type(message).SetInParent(message)
         field = ""
         try:
             for field, fill in fill_custom_fields:  # noqa: B007  # errors name it

@@ -145,20 +145,26 @@ def ros_character(value: int, largest: int) -> str:
 
 
 def characters(values: Iterable[str], largest: int) -> str:
-    """Return characters as one string."""
-    return "".join(chr(code) for code in each(lambda value: character(value, largest), values))
+    """Return characters, the wide ones of which are UTF-16 code units, as one string."""
+    units = "".join(chr(code) for code in each(lambda value: character(value, largest), values))
+    try:
+        return ros_wide(wide(units)).encode().decode()
+    except UnicodeEncodeError as error:
+        raise ValueError(
+            f"half of a surrogate pair stands alone, as at character {error.start}; send both halves"
+        ) from None
 
 
 def ros_characters(values: str, largest: int) -> list[str]:
-    """Return the characters of a string one by one."""
-    return each(lambda value: chr(character(value, largest)), values)
+    """Return the characters of a string one by one, wide ones as UTF-16 code units."""
+    return each(lambda unit: ros_character(unit, largest), memoryview(wide(values)).cast("H"))
 
 
 def wide(value: str) -> bytes:
-    """Return a wide string as its UTF-16 code units, little-endian."""
-    return string(value).encode("utf-16-le")
+    """Return a wide string as its UTF-16 code units, little-endian; a surrogate may stand alone, as in ROS."""
+    return string(value).encode("utf-16-le", "surrogatepass")
 
 
 def ros_wide(value: bytes) -> str:
     """Return the wide string of UTF-16 code units."""
-    return value.decode("utf-16-le")
+    return value.decode("utf-16-le", "surrogatepass")

@@ -34,7 +34,7 @@ from rosidl_adapter_proto.schema.numbering import (
     Numbering,
     SequentialNumbering,
 )
-from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, proto_file
+from rosidl_adapter_proto.schema.proto import ProtoFile, check_names, check_nesting, proto_file
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,9 @@ def generate(
     new_fingerprint = fingerprint(request, catalog, options, new_lock_text, names)
     manifest = make_manifest(new_fingerprint, names, files, numbers)
     changed = changes(output, files)
-    warnings = _warnings(catalog, names)
+    # An unchanged run does not repeat those of definitions, since it parses nothing.
+    of_definitions = tuple(each for name in names for each in catalog.definition(name).interface.warnings)
+    warnings = (*of_definitions, *_warnings(catalog, names))
     if not check:
         # The lock file comes first: numbers that nothing uses yet do no harm, but used ones that are not kept do.
         if new_lock_text is not None and new_lock_text != lock_text:
@@ -180,6 +182,7 @@ def _proto_files(
         for name in names
     ]
     check_names(protos)
+    check_nesting(protos)
     for name in names:
         _check_length(name)
     return protos

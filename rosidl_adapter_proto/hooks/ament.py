@@ -5,7 +5,7 @@
 `parse` and `check` run when the package is configured, so that our errors, which name the place, come before those of
 ROS. `generate` runs when it is built. It writes two folders: `package` with what is generated of the package itself,
 which CMake installs, and `dependencies` with the packages that it needs and that do not come with its dependencies:
-those of a ROS that came as binaries. `install` installs these.
+those of a ROS that came as binaries. `install` installs these. What fails is an error here, and a warning of CMake.
 """
 
 from __future__ import annotations
@@ -124,8 +124,9 @@ def check(build: Build) -> None:
     Raises:
         Error: Something is wrong with one.
     """
-    _check_dependencies(build)
-    check_definitions(Request((build.package,), dependencies=False), build.catalog(), build.options)
+    catalog = build.catalog()
+    _check_dependencies(build, catalog)
+    check_definitions(Request((build.package,), dependencies=False), catalog, build.options)
 
 
 def generate_package(build: Build) -> None:
@@ -134,8 +135,8 @@ def generate_package(build: Build) -> None:
     Raises:
         Error: Something is wrong with a definition, or files cannot be written.
     """
-    _check_dependencies(build)
     catalog = build.catalog()
+    _check_dependencies(build, catalog)
     own = Request((build.package,), dependencies=False)
     renumber = is_kept(build.options)
     result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options, renumber=renumber)
@@ -150,7 +151,7 @@ def generate_package(build: Build) -> None:
     _write_depfile(build)
 
 
-def _check_dependencies(build: Build) -> None:
+def _check_dependencies(build: Build, catalog: Catalog) -> None:
     """Check that no package that the definitions refer to was built without protobuf types.
 
     They could be made here, but with other field numbers than that package will have once its own are made.
@@ -160,7 +161,7 @@ def _check_dependencies(build: Build) -> None:
     """
     needed = {
         name.package
-        for definition in build.own_source().packages[build.package].values()
+        for definition in catalog.package(build.package).values()
         for message in messages(definition.interface, events=build.options.events)
         for _, name in references(message)
     }

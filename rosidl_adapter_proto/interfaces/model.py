@@ -1,8 +1,8 @@
 """The model of ROS 2 interfaces: what everything between reading and writing speaks.
 
 A `Message` has fields and constants; a `Service` and an `Action` group messages and derive the ones that ROS
-adds to them. Everything is immutable and compares by value. Comments, locations and the text a definition was read
-from do not take part in comparisons: two definitions are equal when they describe the same type.
+adds to them. Everything is immutable and compares by value. Comments, locations, the text a definition was read from
+and the warnings about it do not take part in comparisons: two definitions are equal when they describe the same type.
 """
 
 from __future__ import annotations
@@ -208,6 +208,7 @@ class Message:
     comment: tuple[str, ...] = field(default=(), compare=False)
     annotations: tuple[Annotation, ...] = ()
     text: str = field(default="", compare=False, repr=False)
+    warnings: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -218,6 +219,7 @@ class Service:
     request: Message
     response: Message
     text: str = field(default="", compare=False, repr=False)
+    warnings: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def event(self) -> Message:
@@ -241,6 +243,7 @@ class Action:
     result: Message
     feedback: Message
     text: str = field(default="", compare=False, repr=False)
+    warnings: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def send_goal(self) -> Service:

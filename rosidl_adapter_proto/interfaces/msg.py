@@ -11,6 +11,7 @@ import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.model import (
@@ -32,7 +33,7 @@ from rosidl_adapter_proto.interfaces.model import (
     ValueType,
     value_type,
 )
-from rosidl_adapter_proto.interfaces.problem import problem
+from rosidl_adapter_proto.interfaces.problem import problem, wide_string_warning
 from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
 
 _PRIMITIVE_TYPES = {name: row for row in SCALARS.values() for name in row.msg}
@@ -93,13 +94,14 @@ def parse_msg(text: str, name: TypeName, file: str, *, ros1_names: bool = False)
 def parse_srv(text: str, name: TypeName, file: str) -> Service:
     """Read a `.srv` definition; arguments and errors are those of `parse_msg`."""
     request, response = _parse_sections(text, name, file, ("_Request", "_Response"))
-    return Service(name, request, response, text)
+    return Service(name, request, response, text, (*request.warnings, *response.warnings))
 
 
 def parse_action(text: str, name: TypeName, file: str) -> Action:
     """Read an `.action` definition; arguments and errors are those of `parse_msg`."""
     goal, result, feedback = _parse_sections(text, name, file, ("_Goal", "_Result", "_Feedback"))
-    return Action(name, goal, result, feedback, text)
+    warnings = (*goal.warnings, *result.warnings, *feedback.warnings)
+    return Action(name, goal, result, feedback, text, warnings)
 
 
 def _parse_sections(text: str, name: TypeName, file: str, suffixes: tuple[str, ...]) -> list[Message]:
@@ -135,6 +137,13 @@ def _separator_problem(
     return problem(message, "\n".join(lines), Location(file, line + 1))
 
 
+class _CommentLine(NamedTuple):
+    """The text of a comment behind its mark, and its line, counted from 1."""
+
+    text: str
+    line: int
+
+
 class _MessageReader:
     """Reads one message out of some lines of a definition."""
 
@@ -144,6 +153,7 @@ class _MessageReader:
         self.file = file
         self.lines = text.splitlines()
         self.ros1_names = ros1_names
+        self.warnings: list[str] = []
 
     def read(self, start: int, end: int, text: str = "") -> Message:
         """Read the lines from `start` up to `end`, counted from 0."""
@@ -152,41 +162,77 @@ class _MessageReader:
                 raise DefinitionError(
                     f"{self.file}: {part!r} is not a valid {kind} name; {_NAME_ADVICE[kind]}"
                 )
-        message_comment: list[str] = []
+        message_comment: list[_CommentLine] = []
         while start < end and self.lines[start].startswith("#"):
-            message_comment.append(self.lines[start].lstrip("#"))
             start += 1
+            message_comment.append(_CommentLine(self.lines[start - 1].lstrip("#"), start))
+        self._check_comment(message_comment)  # what else comes to it below is lost on the way to .idl
 
-        pending: list[str] = []  # comment lines that wait for the element they stand above
-        comments: list[list[str]] = []  # of each element, in order of appearance
+        pending: list[_CommentLine] = []  # comment lines that wait for the element they stand above
+        comments: list[list[_CommentLine]] = []  # of each element, in order of appearance
         elements: list[Field | Constant] = []
         for number, line in enumerate(self.lines[start:end], start + 1):
             code, mark, comment = line.replace("\t", " ").rstrip().partition("#")
             if mark and code and not code.strip():
                 # An indented comment goes on with that of the element above; before the first, the message has it.
-                (comments[-1] if comments else message_comment).append(comment.lstrip("#"))
+                indented = _CommentLine(comment.lstrip("#"), number)
+                (comments[-1] if comments else message_comment).append(indented)
                 continue
             if mark:
-                pending.append(comment.lstrip("#"))
+                pending.append(_CommentLine(comment.lstrip("#"), number))
             if not code.strip():
                 continue
             elements.append(self._element(code, number))
             comments.append(pending)
             pending = []
 
-        documented = [
-            replace(element, comment=comment, unit=unit)
-            for element, (comment, unit) in zip(elements, map(_comment_and_unit, comments), strict=True)
-        ]
+        documented = list(map(self._documented, elements, comments))
         fields = [element for element in documented if isinstance(element, Field)]
         constants = [element for element in documented if isinstance(element, Constant)]
         self._refuse_duplicates(fields)
         self._refuse_duplicates(constants)
         if pending:
-            message_comment += ["", *pending]
+            message_comment += [_CommentLine("", pending[0].line), *pending]
         if not fields:
             fields.append(Field(EMPTY_STRUCT_FIELD, BasicType("uint8")))
-        return Message(self.name, tuple(fields), tuple(constants), _tidy(message_comment), (), text)
+        return Message(
+            self.name,
+            tuple(fields),
+            tuple(constants),
+            _tidy([each.text for each in message_comment]),
+            (),
+            text,
+            tuple(self.warnings),
+        )
+
+    def _documented(self, element: Field | Constant, lines: list[_CommentLine]) -> Field | Constant:
+        """Return a field or constant with its comment and unit."""
+        texts, unit = _without_unit(lines)
+        self._check_comment(lines)
+        if unit is not None and isinstance(element, Field):  # the .idl does not have the units of constants
+            marked = next((each.line for each in lines if "\\" in each.text), lines[0].line)
+            self._check_escapes(unit, marked)
+        return replace(element, comment=_tidy(texts), unit=unit)
+
+    def _check_comment(self, lines: list[_CommentLine]) -> None:
+        """Refuse a comment that ROS 2 cannot read."""
+        texts, _ = _without_unit(lines)
+        for text, each in zip(texts, lines, strict=True):
+            self._check_escapes(text, each.line)
+
+    def _check_escapes(self, text: str, line: int) -> None:
+        """Refuse a line of a comment, or a unit, that is broken on the way to .idl, where it is a string."""
+        if self.ros1_names:
+            return
+        try:
+            _through_idl(text)
+        except ValueError:
+            column = self.lines[line - 1].find("\\") + 1 or 1
+            raise self._problem(
+                "ROS 2 takes a backslash in a comment for an escape sequence, and cannot read this one; "
+                r"write \\\\ for a backslash",
+                Location(self.file, line, column),
+            ) from None
 
     def _element(self, code: str, number: int) -> Field | Constant:
         """Read a field or constant from a line without its comment."""
@@ -248,9 +294,19 @@ class _MessageReader:
         if size_text is None:
             return element
         if not size_text and not match["upper_bound"]:
-            return SequenceType(element)
+            return SequenceType(element, self._bound_as_in_ros(element, location))
         size = self._positive(size_text, f"the size of array type {text!r}", location)
         return SequenceType(element, size) if match["upper_bound"] else ArrayType(element, size)
+
+    def _bound_as_in_ros(self, element: ValueType, location: Location) -> int | None:
+        """Return the bound of a sequence without one: `rosidl_parser` gives it that of its wide strings, by mistake.
+
+        It is what is installed and hashed.
+        """
+        if not isinstance(element, StringType) or not element.wide or element.bound is None:
+            return None
+        self.warnings.append(f"{location}: {wide_string_warning(element.bound)}")
+        return element.bound
 
     def _value_type(self, text: str, location: Location) -> ValueType:
         base, is_bounded, bound_text = text.partition("<=")
@@ -534,12 +590,14 @@ def _read_from_idl(escaped: str) -> str:
 _ESCAPED_CHARACTERS = dict(zip("ntvbrfa", "\n\t\v\b\r\f\a", strict=True))
 
 
-def _comment_and_unit(lines: list[str]) -> tuple[tuple[str, ...], str | None]:
-    units = list(_units("\n".join(lines)))
+def _without_unit(lines: list[_CommentLine]) -> tuple[list[str], str | None]:
+    """Return the lines of a comment without the unit, and the unit, if there is exactly one."""
+    texts = [each.text for each in lines]
+    units = list(_units("\n".join(texts)))
     if len(units) != 1:
-        return _tidy(lines), None
+        return texts, None
     marked, unit = units[0]
-    return _tidy([line.replace(marked, "") for line in lines]), unit
+    return [text.replace(marked, "") for text in texts], unit
 
 
 def _units(comment: str) -> Iterator[tuple[str, str]]:

@@ -26,3 +26,11 @@ def problem(message: str, text: str, location: Location) -> DefinitionError:
     # A tab stays a tab below, so that it is as wide in the line of the caret as in the line above.
     padding = "".join("\t" if each == "\t" else " " for each in before_caret)
     return DefinitionError(f"{location}: {message}\n  {excerpt}\n  {padding}^")
+
+
+def wide_string_warning(bound: int) -> str:
+    """Return what to know of a sequence of wide strings with a bound, `wstring<=5[]` or `sequence<wstring<5>>`."""
+    return (
+        f"ROS 2 takes the bound of these wide strings for that of the sequence too, and so it is generated: at most "
+        f"{bound} elements; give the sequence a bound of its own"
+    )

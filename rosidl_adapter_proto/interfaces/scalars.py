@@ -62,7 +62,7 @@ class Scalar:
         bounded_type_id: Its number in a type description when it has a bound.
         bits: Width of an integer, octet or character.
         signed: Whether it has values below zero.
-        largest_character: Largest character that a message can have.
+        largest_character: Largest character that a message can have, as a number.
         typecode: What `array.array` calls it, if ROS has its arrays as array.array (sequences) or numpy (arrays).
     """
 
@@ -89,7 +89,7 @@ class Scalar:
             raise ValueError(f"{self.name} has no range")
         if self.signed:
             return -(1 << (self.bits - 1)), (1 << (self.bits - 1)) - 1
-        return 0, (1 << self.bits) - 1
+        return 0, self.largest_character or (1 << self.bits) - 1
 
     @property
     def is_string(self) -> bool:
@@ -123,6 +123,7 @@ _ROWS = (
     Scalar(
         "octet", Family.OCTET, 16, "uint32", "bytes", False, CdrForm.UINT8, "uint8_t", msg=("byte",), bits=8
     ),
+    # rclpy reads ASCII only: other bytes make it fail, and of other characters it writes one byte of their UTF-8.
     Scalar(
         "char",
         Family.CHARACTER,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -60,17 +61,26 @@ def check_type_hash(adapter: Any, ros_type: Any, logger: RcutilsLogger) -> None:
 def _installed_type_hash(type_name: str, package: str) -> tuple[str | None, Path]:
     """Return the hash of an installed type, and the file that has it."""
     namespace, name = type_name.split("/")[-2:]
-    # What belongs to a service or action, such as SetBool_Request, is described in the file of that one.
-    file = Path("share", package, namespace, name.partition("_")[0] + ".json")
+    folder = Path("share", package, namespace)
     module_file = getattr(sys.modules[package], "__file__", None) or ""
     for prefix in Path(module_file).parents:
-        try:
-            description = json.loads((prefix / file).read_bytes())
-        except OSError:
-            continue
-        hashes = {each["type_name"]: each["hash_string"] for each in description["type_hashes"]}
-        return hashes.get(type_name), prefix / file
-    return None, file
+        for owner in _possible_owners(name):
+            file = prefix / folder / f"{owner}.json"
+            try:
+                description = json.loads(file.read_bytes())
+            except OSError:
+                continue
+            hashes = {each["type_name"]: each["hash_string"] for each in description["type_hashes"]}
+            if type_name in hashes:
+                return hashes[type_name], file
+    return None, folder / f"{name}.json"
+
+
+def _possible_owners(name: str) -> Iterator[str]:
+    """Yield the interfaces that a type may be, or be a part of: `SetBool_Request` is described with `SetBool`."""
+    while name:
+        yield name
+        name = name.rpartition("_")[0]
 
 
 def publishers_of_other_versions(node: Node, topic: str, adapter: Any) -> list[str]:

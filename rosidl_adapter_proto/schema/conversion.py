@@ -228,9 +228,10 @@ def _field_conversion(field: ProtoField, packed_numbers: tuple[int, ...]) -> Fie
     zero = ZEROS[element.family]
     if not element.repeated:
         all_at_once = COMPACT_VALUES[element.family](field)
+        # What is counted is what ROS has: some characters of text are two in ROS.
         values = BothWays(
             length.to_custom + all_at_once.to_custom,
-            length.to_ros + all_at_once.to_ros,
+            all_at_once.to_ros + length.to_ros,
         )
         return Compact(values, size, zero)
     return Values(VALUES[element.family](field), length, size, zero)
@@ -365,6 +366,16 @@ def ros_class(name: TypeName, interface: Interface) -> str:
 def _ros_part(name: TypeName, service: Service) -> str:
     part = name.name.removeprefix(service.name.name).removeprefix("_")
     return f".{part}" if part else ""
+
+
+NAMED_PARTS = {
+    "request": "Request",
+    "response": "Response",
+    "goal": "Goal",
+    "result": "Result",
+    "feedback": "Feedback",
+}
+"""The parts of services and actions that are messages of the user, and what ROS calls their classes."""
 
 
 def has_defaults(message: Message, find: Callable[[TypeName], Message]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.errors import SchemaError
@@ -27,6 +27,7 @@ from rosidl_adapter_proto.interfaces.model import (
 from rosidl_adapter_proto.interfaces.scalars import Family, Scalar
 from rosidl_adapter_proto.schema.numbering import Numbering
 from rosidl_adapter_proto.schema.typemap import (
+    MAXIMUM_DEPTH,
     PROTO_ACTION_GET_RESULT_CALL_NAME,
     PROTO_ACTION_SEND_GOAL_CALL_NAME,
     PROTO_SERVICE_CALL_NAME,
@@ -200,6 +201,60 @@ def check_names(files: Iterable[ProtoFile]) -> None:
                 )
 
 
+def check_nesting(files: Iterable[ProtoFile]) -> None:
+    """Check that protobuf can read every message, however deep others are nested in it.
+
+    Args:
+        files: Each file behind those that it imports.
+
+    Raises:
+        SchemaError: Messages are nested too deep.
+    """
+    depths: dict[TypeName, int] = {}
+    for file in files:
+        own = {message.type_name: message for message in file.messages}
+        for message in own.values():
+            _measure(message, own, depths)
+
+
+def _measure(message: ProtoMessage, own: Mapping[TypeName, ProtoMessage], depths: dict[TypeName, int]) -> int:
+    """Return how many messages lie in each other, from this one on; those of `own` may not be in `depths` yet."""
+    if message.type_name not in depths:
+        depth = 1
+        for field, name in references(message.source):
+            nested = _measure(own[name], own, depths) if name in own else depths[name]
+            if nested == MAXIMUM_DEPTH:
+                raise SchemaError(
+                    f"{_place(message.source, field)} nests messages more than {MAXIMUM_DEPTH} deep, which protobuf "
+                    f"does not read; flatten {name} or what is in it"
+                )
+            depth = max(depth, nested + 1)
+        depths[message.type_name] = depth
+    return depths[message.type_name]
+
+
+def _place(message: Message, field: Field) -> str:
+    """Return how errors call a field, with the place where it is defined if that is known."""
+    return f"{message.name}.{field.name}" + (f" ({field.location})" if field.location else "")
+
+
+LARGEST_COUNT = 0xFFFF_FFFF
+"""The largest number of elements or characters that CDR has a count for (DDS-XTypes 1.3, section 7.4.3.5)."""
+
+
+def _check_counts(message: Message) -> None:
+    """Check that CDR can count what each field may hold."""
+    for field in message.fields:
+        shape, _, capacity, string_bound = type_parts(field.type)
+        what = "the length of an array" if shape is Shape.ARRAY else "the bound of a sequence"
+        for count, called in ((capacity, what), (string_bound, "the bound of a string")):
+            if count is not None and count > LARGEST_COUNT:
+                raise SchemaError(
+                    f"{_place(message, field)}: {called} must be at most {LARGEST_COUNT}, since ROS sends no more, "
+                    f"not {count}"
+                )
+
+
 def _proto_message(message: Message, numbering: Numbering) -> ProtoMessage:
     for name in (message.name.package, message.name.name, *(each.name for each in message.fields)):
         if not _IDENTIFIER.fullmatch(name):
@@ -207,6 +262,7 @@ def _proto_message(message: Message, numbering: Numbering) -> ProtoMessage:
                 f"{message.name}: protobuf cannot take the name {name!r}; "
                 "use letters, digits and underscores, beginning with a letter"
             )
+    _check_counts(message)
     numbers = numbering.numbers(message)
     fields = tuple(_proto_field(each, numbers.fields[each.name]) for each in message.fields)
     return ProtoMessage(
@@ -244,8 +300,6 @@ def _proto_field(field: Field, number: int) -> ProtoField:
 
 
 def _limits(scalar: Scalar) -> tuple[int, int] | None:
-    if scalar.family is Family.CHARACTER:
-        return 0, scalar.largest_character
     if scalar.bits and scalar.bits < _PROTOBUF_INTEGER_BITS:
         return scalar.range
     return None
@@ -339,9 +393,23 @@ def _literal(value: Value) -> str:
     return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
 
 
+def plain_lines(lines: Iterable[str]) -> Iterator[str]:
+    """Yield lines that can stand in a comment of any language.
+
+    They are split at every line break there is, since one inside a comment would end it. Other control characters, of
+    which NUL ends a file for protoc and Python, are replaced by the pictures that Unicode has of them.
+    """
+    for each in lines:
+        for line in each.splitlines() or [""]:
+            yield line.rstrip().translate(_CONTROL_PICTURES)
+
+
+_CONTROL_PICTURES = {**{code: 0x2400 + code for code in range(0x20) if chr(code) != "\t"}, 0x7F: 0x2421}
+
+
 def _lines(lines: Iterable[str]) -> tuple[str, ...]:
-    """Split at every line break there is, since one inside a comment would end it, and drop outer empty lines."""
-    split = [line.rstrip() for each in lines for line in each.splitlines() or [""]]
+    """Return lines that can stand in a comment, without outer empty ones."""
+    split = list(plain_lines(lines))
     while split and not split[0]:
         split.pop(0)
     while split and not split[-1]:

@@ -22,7 +22,7 @@ from rosidl_adapter_proto.interfaces.model import ScalarValue, TypeName, parts
 from rosidl_adapter_proto.schema.descriptor import file_descriptor
 from rosidl_adapter_proto.schema.numbering import HashNumbering, Numbering, SequentialNumbering
 from rosidl_adapter_proto.schema.pools import File, MessageClass, load, message_class
-from rosidl_adapter_proto.schema.proto import ProtoFile, ProtoMessage, check_names, proto_file
+from rosidl_adapter_proto.schema.proto import ProtoFile, ProtoMessage, check_names, check_nesting, proto_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,8 +246,10 @@ class TypeRegistry:
         names = type_closure(self._catalog, name, events=self._events)
         new = {each: self._file(each) for each in names if each not in self._files}
         check_names(each.proto for each in (*self._files.values(), *new.values()))
+        found = [(new.get(each) or self._files[each]) for each in names]
+        check_nesting(each.proto for each in found)
         self._files.update(new)
-        return [self._files[each] for each in names]
+        return found
 
     def _file(self, name: TypeName) -> File:
         interface = self._catalog.definition(name).interface

@@ -26,6 +26,9 @@ PROTO_ACTION_SEND_GOAL_CALL_NAME = "SendGoal"
 PROTO_ACTION_GET_RESULT_CALL_NAME = "GetResult"
 """The rpc that waits for the result of an action's goal."""
 
+MAXIMUM_DEPTH = 100
+"""How many messages may lie in each other: protobuf's own limit for parsers."""
+
 
 def proto_package(name: TypeName) -> str:
     """Return the protobuf package of a type: `std_msgs.msg.pb`."""

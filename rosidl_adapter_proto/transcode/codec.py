@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from google.protobuf.descriptor import Descriptor
@@ -26,9 +25,6 @@ MessageT = TypeVar("MessageT", bound=Message)
 
 NOWHERE = 2**64 - 1
 """The place of a message that could not be transcoded: no buffer is so large."""
-
-MAXIMUM_CHOICES = 64
-"""How many choices of fields a codec remembers; a program asks for the same few again and again."""
 
 MAXIMUM_SIZE = 2**31 - 1
 """The largest protobuf message in bytes (https://protobuf.dev/programming-guides/encoding/#size-limit)."""
@@ -198,19 +194,15 @@ class Codec(_core.Codec[MessageT]):
         self.transcoder = Transcoder(type_description, descriptor)
         self.message_class = message_class
         self._type_description = type_description
-        self._of_fields = lru_cache(MAXIMUM_CHOICES)(
-            partial(_codec_of_fields, type_description, message_class)
-        )
         super().__init__(self.transcoder, message_class)
 
     def __reduce__(self) -> tuple[type[Codec[MessageT]], tuple[TypeDescription, type[MessageT]]]:
         return type(self), (self._type_description, self.message_class)
 
-    def _from_cdr(self, data: Buffer, /, fields: Iterable[str] | None = None) -> MessageT:
-        """Do `from_cdr` with any arguments."""
-        if fields is None:
-            return self.from_cdr(data)
-        return self._of_fields(fields if isinstance(fields, str) else tuple(fields)).from_cdr(data)
+    def _transcoder_of(self, fields: Iterable[str]) -> Transcoder:
+        """Return what transcodes only some fields; asked once for each choice."""
+        descriptor: Any = self.message_class.DESCRIPTOR
+        return Transcoder(self._type_description, descriptor, fields=fields)
 
     def _refuse(self, message: object) -> NoReturn:
         """Refuse a message of another class."""
@@ -224,11 +216,3 @@ class Codec(_core.Codec[MessageT]):
             f"protobuf does not serialize it ({error}); a message has {MAXIMUM_SIZE} bytes at most, split it"
         )
         raise ConversionError(self.transcoder.type_name, "", reason) from error
-
-
-def _codec_of_fields(
-    type_description: TypeDescription, message_class: type[MessageT], fields: Iterable[str]
-) -> _core.Codec[MessageT]:
-    """Return what reads only some fields of a type."""
-    descriptor: Any = message_class.DESCRIPTOR
-    return _core.Codec(Transcoder(type_description, descriptor, fields=fields), message_class)

@@ -22,12 +22,10 @@ from rosidl_adapter_proto.interfaces.description import (
 )
 from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, Shape, TypeName
 from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, CdrForm, Scalar
+from rosidl_adapter_proto.schema.typemap import MAXIMUM_DEPTH
 
 VERSION = 2
 """The version of packed plans, which the core must have too."""
-
-MAXIMUM_DEPTH = 100
-"""How deep messages may be nested: protobuf's own limit for parsers."""
 
 UNBOUNDED = 0xFFFFFFFF
 """A count or string length without a bound."""

@@ -73,11 +73,15 @@ def test_services_and_actions() -> None:
     assert issubclass(service, ServiceAdapter)
     assert service.request is adapter_for("runtime_groups/srv/Set_Request", registry)
     assert service.response.custom_type(ok=True).ok
+    assert service.Request(on=True) == service.request.new(on=True)
+    assert service.Response is service.response.custom_type
     assert service.ros_class == "runtime_groups.srv:Set"
     assert issubclass(action, ActionAdapter)
     assert action.send_goal is adapter_for("runtime_groups/action/Go_SendGoal", registry)
     assert action.send_goal.request.fields[1].nested is action.goal
     assert action.feedback_message.ros_class == "runtime_groups.action:Go.Impl.FeedbackMessage"
+    parts = (action.goal, action.result, action.feedback)
+    assert (action.Goal, action.Result, action.Feedback) == tuple(part.custom_type for part in parts)
 
 
 def test_attributes_are_those_of_generated_adapters(generated_things: SimpleNamespace) -> None:
@@ -202,3 +206,26 @@ def test_an_adapter_outlives_its_registry() -> None:
     assert reference() is None
     message = adapter.new(header={"frame_id": "map"})
     assert adapter.from_cdr(adapter.to_cdr(message)).header.frame_id == "map"
+
+
+def test_deep_messages() -> None:
+    """As deep as messages may be: the default value of the innermost is there, and nothing runs out of stack."""
+    texts = {f"runtime_deep/msg/M{index}": f"M{index + 1} m" for index in range(99)}
+    registry = TypeRegistry.from_texts({**texts, "runtime_deep/msg/M99": "int8 x 5"})
+    deep = adapter_for("runtime_deep/msg/M0", registry)
+    message: Any = deep.new()
+    assert deep.from_cdr(deep.to_cdr(message)) == message
+    assert len(deep.type_description()["referenced_type_descriptions"]) == 99
+    for _ in range(99):
+        message = message.m
+    assert message.x == 5
+
+
+def test_wide_messages() -> None:
+    """Each message has the next three times: there are 60 types, and more messages than can be made."""
+    texts = {f"runtime_wide/msg/M{index}": f"M{index + 1} a\nM{index + 1}[2] b\n" for index in range(60)}
+    registry = TypeRegistry.from_texts({**texts, "runtime_wide/msg/M60": "int8 x"})
+    wide = adapter_for("runtime_wide/msg/M0", registry)
+    assert not wide.has_defaults
+    assert wide.new() == wide.custom_type()
+    assert len(wide.type_description()["referenced_type_descriptions"]) == 60

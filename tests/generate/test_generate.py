@@ -654,3 +654,62 @@ def test_same_bytes_everywhere(seed: str, source: Path, generated: Path, tmp_pat
     )
 
     assert content(elsewhere / "cwd" / "out") == content(generated)
+
+
+def test_warnings_of_definitions(source: Path, output: Path) -> None:
+    file = source / "base_msgs" / "msg" / "Wide.msg"
+    file.write_text("wstring<=5[] x\n")
+    expected = (
+        f"{file}:1:1: ROS 2 takes the bound of these wide strings for that of the sequence too, and so it is "
+        "generated: at most 5 elements; give the sequence a bound of its own",
+    )
+    assert run(source, output).warnings == expected
+    assert run(source, output).warnings == ()  # a run with nothing to do parses nothing
+
+
+@pytest.mark.parametrize("length", [101, 400])
+def test_messages_that_are_nested_too_deep(length: int, tmp_path: Path, output: Path) -> None:
+    definitions = {f"msg/D{each}.msg": f"D{each + 1} x\n" for each in range(length - 1)}
+    source = write_package(tmp_path / "deep_msgs", {**definitions, f"msg/D{length - 1}.msg": "int8 x\n"})
+    outer, inner = f"D{length - 101}", f"D{length - 100}"
+    with pytest.raises(SchemaError) as caught:
+        run(source, output, ["deep_msgs"])
+    assert str(caught.value) == (
+        f"deep_msgs/msg/{outer}.x ({source}/msg/{outer}.msg:1:{len(inner) + 2}) nests messages more than 100 deep, "
+        f"which protobuf does not read; flatten deep_msgs/msg/{inner} or what is in it"
+    )
+    assert not output.exists()
+
+
+def test_control_characters_in_comments(tmp_path: Path, output: Path) -> None:
+    text = "# a\0b\n\nint8 x # \0\x1b\x7f [\x01]\nint8 Y=1 # \0\n"
+    source = write_package(tmp_path / "odd_msgs", {"msg/Odd.msg": text})
+    run(source, output, ["odd_msgs"])
+    texts = {path.suffix: path.read_text() for path in output.rglob("Odd*.p*") if path.name[-7:] != "_pb2.py"}
+    assert texts.keys() == {".proto", ".pyi", ".py"}
+    for each in texts.values():
+        assert "a␀b" in each
+        assert not set(each) & set(map(chr, (*range(9), *range(14, 32), 127)))
+    assert "␀␛␡" in texts[".proto"]
+
+
+def test_deep_and_wide_messages(tmp_path: Path, output: Path) -> None:
+    """A chain as long as it may be, and messages that each have the next three times."""
+    deep = {f"msg/D{each}.msg": f"D{each + 1} x\n" for each in range(99)}
+    wide = {f"msg/W{each}.msg": f"W{each + 1} a\nW{each + 1}[2] b\n" for each in range(30)}
+    last = {"msg/D99.msg": "int8 x 5\n", "msg/W30.msg": "int8 x\n"}
+    source = write_package(tmp_path / "large_msgs", {**deep, **wide, **last})
+    run(source, output, ["large_msgs"], options=Options(python_root="large_root"))
+    program = """if True:
+        import sys
+        from large_root.large_msgs.msg import D0Adapter, W0, W0Adapter
+        message = D0Adapter.new()
+        for _ in range(99):
+            message = message.x
+        assert message.x == 5
+        assert W0Adapter.new() == W0()
+        sizes = [len(each.type_description()["referenced_type_descriptions"]) for each in (D0Adapter, W0Adapter)]
+        assert sizes == [99, 30]
+    """
+    environment = {**os.environ, "PYTHONPATH": str(output / "python")}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True)

@@ -15,6 +15,7 @@ from rosidl_adapter_proto.interfaces.description import (
     type_hash,
 )
 from rosidl_adapter_proto.interfaces.find import prefix_sources
+from rosidl_adapter_proto.interfaces.idl import parse_idl
 from rosidl_adapter_proto.interfaces.model import (
     Action,
     ArrayType,
@@ -172,3 +173,37 @@ def test_default_values_are_described_but_not_hashed() -> None:
     assert [described(each)[0] for each in (True, 1.5, "a", (1, 2), ("a",))] == [
         *("True", "1.5", "a", "(1, 2)", "('a',)"),
     ]
+
+
+# Definitions that OMG IDL has otherwise than ROS 2: the hash is that of ROS 2's own generator
+
+ODD_MEMBERS = [
+    "sequence<wstring<5>> a;",
+    "sequence<wstring<5>, 7> a;",
+    "sequence<string<5>> a;",
+    "sequence<wstring<2 + 3>> a;",
+    "long a[2+1];",
+    "string<(1 + 2) * 3> a;",
+    "sequence<long, 0x10 + 2> a;",
+]
+
+
+@pytest.mark.parametrize("member", ODD_MEMBERS)
+def test_hashes_of_odd_definitions(member: str, tmp_path: Path) -> None:
+    generator = pytest.importorskip("rosidl_generator_type_description", reason="needs the ROS wheels")
+    text = f"module pkg {{ module msg {{ struct Foo {{ {member} }}; }}; }};"
+    (tmp_path / "msg").mkdir()
+    (tmp_path / "msg" / "Foo.idl").write_text(text)
+    arguments = {
+        "package_name": "pkg",
+        "output_dir": str(tmp_path),
+        "idl_tuples": [f"{tmp_path}:msg/Foo.idl"],
+    }
+    (tmp_path / "arguments.json").write_text(json.dumps(arguments))
+    generator.generate_type_hash(str(tmp_path / "arguments.json"))
+    installed = json.loads((tmp_path / "msg" / "Foo.json").read_text())
+    foo = parse_idl(text, TypeName("pkg", "msg", "Foo"), "Foo.idl")
+    assert isinstance(foo, Message)
+    description = describe(foo.name, {foo.name: foo}.__getitem__)
+    assert description == installed["type_description_msg"]
+    assert [{"type_name": str(foo.name), "hash_string": type_hash(description)}] == installed["type_hashes"]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rosidl_adapter_proto.errors import DefinitionError
@@ -129,6 +129,9 @@ FIELDS: list[tuple[str, Field]] = [
             "string<=5[]": SequenceType(StringType(bound=5)),
             "string<=5[2]": ArrayType(StringType(bound=5), 2),
             "wstring<=5[<=2]": SequenceType(StringType(True, 5), 2),
+            "wstring<=5[]": SequenceType(StringType(True, 5), 5),
+            "wstring<=5[2]": ArrayType(StringType(True, 5), 2),
+            "wstring[]": SequenceType(WSTRING),
             "Bar[2]": ArrayType(TypeName("pkg", "msg", "Bar"), 2),
             "other/Bar[<=2]": SequenceType(TypeName("other", "msg", "Bar"), 2),
         }.items()
@@ -367,6 +370,124 @@ def test_layouts(
     assert facts(message) == facts(theirs)
 
 
+@pytest.mark.parametrize("name", [FOO, DO, GO], ids=str)
+def test_a_sequence_of_bounded_wide_strings_has_their_bound_and_a_warning(name: TypeName) -> None:
+    text = "\n---\n".join(["wstring<=5[] x", "wstring<=6[<=2] x", "string<=5[] x"][: len(parts_of(name))])
+    assert parse(text, name).warnings == (
+        f"{name.name}.{name.namespace}:1:1: ROS 2 takes the bound of these wide strings for that of the sequence "
+        "too, and so it is generated: at most 5 elements; give the sequence a bound of its own",
+    )
+
+
+def parts_of(name: TypeName) -> range:
+    return range({"msg": 1, "srv": 2, "action": 3}[name.namespace])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "  # before all \\",
+        "int8 x\n# behind all \\",
+        "int8 X=1 # [\\n]",  # a unit of a constant
+    ],
+)
+def test_comments_that_ros_does_not_look_into(text: str, tmp_path: Path) -> None:
+    theirs = official(text, FOO, tmp_path)
+    assert theirs is not None
+    assert parse(text) == theirs
+
+
+def test_ros1_definitions_have_backslashes_in_their_comments() -> None:
+    message = parse_msg(r"int8 x # C:\new", FOO, "Foo.msg", ros1_names=True)
+    assert message.fields[0].comment == (r"C:\new",)
+
+
+# Comments at random
+
+COMMENT_PIECES = (
+    *(
+        "word",
+        "#",
+        "##",
+        " ",
+        "\t",
+        "'",
+        '"',
+        '"""',
+        "@",
+        "@(x)",
+        "@{",
+        "@[",
+        "//",
+        "/*",
+        "*/",
+        "$",
+        "{",
+        "}",
+        "%",
+    ),
+    *(
+        "[m]",
+        "[\\t]",
+        "[a\\b]",
+        "[",
+        "]",
+        ",",
+        "=",
+        ";",
+        "<",
+        "---",
+        "é",
+        "€",
+        "😀",
+        "\0",
+        "\x01",
+        "\x1b",
+        "\x7f",
+    ),
+    *(
+        "\\",
+        "\\\\",
+        "\\\\\\\\",
+        "\\n",
+        "\\t",
+        "\\x41",
+        "\\x4",
+        "\\xe9",
+        "\\xc3\\xa9",
+        "\\u00e9",
+        "\\N{DASH}",
+        "\\101",
+        "\\0",
+    ),
+    *('\\"', "\\'", "\\?", "\\q", "C:\\new", "\x0b", "\x0c", "\x1c", "\x85", "\u2028", "\ufeff"),
+)
+COMMENTS = st.lists(st.sampled_from(COMMENT_PIECES), max_size=4).map(lambda pieces: "#" + "".join(pieces))
+COMMENTED_LINES = st.one_of(
+    COMMENTS,
+    COMMENTS.map("  {}".format),
+    st.builds("{} {}".format, st.sampled_from(["int8 x", "string y", "int8 Z=3", 'string w "#"']), COMMENTS),
+    st.just(""),
+)
+
+
+@given(st.lists(COMMENTED_LINES, max_size=4, unique=True), st.sampled_from(["\n", "\n", "\r\n"]))
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_random_comments_are_accepted_where_ros_does(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], lines: list[str], end: str
+) -> None:
+    text = end.join(lines)
+    theirs = official(text, FOO, tmp_path)
+    try:
+        message = parse(text)
+    except DefinitionError:
+        assert theirs is None
+        return
+    assert theirs is not None
+    if "\\" not in text:  # escape sequences are shown as they were written
+        assert facts(message) == facts(theirs)
+
+
 def test_locations() -> None:
     message = parse_message("# file\r\n\r\nint8 a\r\nint8\t \tb 5 # c\r\nint8  X = 3")
     assert [each.location for each in (*message.fields, *message.constants)] == [
@@ -386,10 +507,9 @@ def test_ros1_definitions_are_less_strict() -> None:
 DIFFERENCES: list[tuple[str, list[object], bool]] = [
     # `rosidl_parser` loses the sign of an infinity.
     ("float64 x -inf", [-math.inf, (), None], True),
-    # A backslash in a comment is an escape sequence for `rosidl_adapter`, or an error. It does not change the type.
+    # `rosidl_adapter` replaces escape sequences in comments, which are shown here as they were written.
     (r"int8 x # a\tb", [None, (r"a\tb",), None], True),
-    (r"int8 x # C:\new", [None, (r"C:\new",), None], False),
-    ("int8 x # goes on \\", [None, ("goes on \\",), None], False),
+    (r"int8 x # C:\\new", [None, (r"C:\\new",), None], True),
 ]
 
 
@@ -504,6 +624,10 @@ BROKEN = (
 ESCAPES = (
     r"ROS 2 cannot read the escape sequences of this string; write "
     r"characters as they are, in UTF-8, and a backslash as \\\\"
+)
+COMMENT = (
+    "ROS 2 takes a backslash in a comment for an escape sequence, and cannot read this one; "
+    r"write \\\\ for a backslash"
 )
 ARRAY = (
     "ROS 2 cannot read this default of an array; "
@@ -766,6 +890,14 @@ ERRORS: list[tuple[TypeName, str, str, str]] = [
     (GO, "", "1:1", "expected 2 lines '---', between goal, result and feedback, found 0"),
     (GO, "int8 a\n---\nint8 b", "3:1", "expected 2 lines '---', between goal, result and feedback, found 1"),
     (GO, "---\n---\n---", "3:1", "expected 2 lines '---', between goal, result and feedback, found 3"),
+    # A backslash in a comment
+    (FOO, r"int8 x # C:\new", "1:12", COMMENT),
+    (FOO, "int8 x # goes on \\", "1:18", COMMENT),
+    (FOO, "# of the message \\q\n# \\\n\nint8 x", "2:3", COMMENT),
+    (FOO, "# above\nint8 X=1\n# \\x4\nint8 x", "3:3", COMMENT),
+    (FOO, "int8 x\n  # below \\u20ac", "2:11", COMMENT),
+    (FOO, "int8 x # [\\n]", "1:11", COMMENT),
+    (DO, "---\nint8 x # \\N", "2:10", COMMENT),
     (GO, "---\n\n---\nint8 A", "4:6", f"'A' is not a valid field name; {LOWER}"),
 ]
 

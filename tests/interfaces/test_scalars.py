@@ -43,7 +43,9 @@ def test_a_row_agrees_with_itself(row: Scalar) -> None:
     assert row.typecode is None or not row.bits or array.array(row.typecode).itemsize * 8 == row.bits
     if has_bits:
         assert row.range == (
-            (-(2**row.bits) // 2, 2**row.bits // 2 - 1) if row.signed else (0, 2**row.bits - 1)
+            (-(2**row.bits) // 2, 2**row.bits // 2 - 1)
+            if row.signed
+            else (0, row.largest_character or 2**row.bits - 1)
         )
     else:
         with pytest.raises(ValueError, match=f"^{row.name} has no range$"):

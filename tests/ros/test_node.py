@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import functools
+import json
 import queue
+import sys
 import threading
 from collections.abc import Callable
-from types import SimpleNamespace
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -239,6 +242,44 @@ def test_a_type_without_description(node: Any, adapter: Any) -> None:
     check_type_hash(Unknown, adapter.ros_message_type, SimpleNamespace(warning=warnings.append))  # type: ignore[arg-type]
     assert len(warnings) == 1
     assert "no type description share/std_msgs/msg/Unknown.json in a folder above" in warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("type_name", "file"),
+    [
+        ("pkg/msg/My_Type", "msg/My_Type"),
+        ("pkg/msg/My_Type", "msg/My_Type_"),
+        ("pkg/srv/My_Service_Request", "srv/My_Service"),
+        ("pkg/action/My_Action_SendGoal_Request", "action/My_Action"),
+        ("pkg/msg/My", "msg/My"),
+    ],
+)
+def test_names_with_underscores(
+    type_name: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each file of the package describes one type, and `My.json` another than the one that is asked for."""
+    from rosidl_adapter_proto.ros.type_hash import TypeHashError, _installed_type_hash, check_type_hash
+
+    for path, described in (("msg/My", "pkg/msg/My"), (file, type_name)):
+        place = tmp_path / "share" / "pkg" / f"{path}.json"
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(json.dumps({"type_hashes": [{"type_name": described, "hash_string": "RIHS01_1"}]}))
+    module = ModuleType("pkg")
+    module.__file__ = str(tmp_path / "lib" / "pkg" / "__init__.py")
+    monkeypatch.setitem(sys.modules, "pkg", module)
+    _installed_type_hash.cache_clear()
+    warnings: list[str] = []
+    adapter: Any = SimpleNamespace(type_name=type_name, type_hash="RIHS01_0")
+    logger: Any = SimpleNamespace(warning=warnings.append)
+    try:
+        if file.endswith("_"):  # a file that cannot be the type's
+            check_type_hash(adapter, SimpleNamespace(__module__="pkg.msg"), logger)
+            assert len(warnings) == 1
+            return
+        with pytest.raises(TypeHashError, match=rf"^{type_name}: .*/share/pkg/{file}\.json has RIHS01_1; "):
+            check_type_hash(adapter, SimpleNamespace(__module__="pkg.msg"), logger)
+    finally:
+        _installed_type_hash.cache_clear()
 
 
 # --- Publishers ---

@@ -122,7 +122,7 @@ def test_messages() -> None:
 def test_compact() -> None:
     at_most = Step(Helper.AT_MOST, (4,))
     assert convert_one(SequenceType(BasicType("octet"), 4)) == Compact(
-        BothWays((at_most, Step(Helper.OCTETS)), (at_most, Step(Helper.ROS_OCTETS))), None, b"\0"
+        BothWays((at_most, Step(Helper.OCTETS)), (Step(Helper.ROS_OCTETS), at_most)), None, b"\0"
     )
 
 

@@ -336,6 +336,34 @@ def test_names_that_protobuf_cannot_take(package: str, name: str, field: str, ba
     )
 
 
+LARGEST = 2**32 - 1
+
+
+@pytest.mark.parametrize(
+    ("type", "number", "what"),
+    [
+        ("int8[{}]", LARGEST + 1, "the length of an array"),
+        ("int8[<={}]", 2**40, "the bound of a sequence"),
+        ("string<={}", 2**64, "the bound of a string"),
+        ("wstring<={}[2]", 2**32, "the bound of a string"),
+    ],
+)
+def test_what_cdr_cannot_count(type: str, number: int, what: str) -> None:
+    with pytest.raises(SchemaError) as caught:
+        mapped(f"int8 a\n{type.format(number)} x")
+    assert str(caught.value) == (
+        f"pkg/msg/Foo.x (Foo.msg:2:{len(type.format(number)) + 2}): {what} must be at most 4294967295, since ROS "
+        f"sends no more, not {number}"
+    )
+    (message,) = mapped(f"{type.format(LARGEST)} x").messages
+    assert [each.name for each in message.fields] == ["x"]
+
+
+def test_control_characters_in_comments() -> None:
+    (message,) = mapped("int8 x # a\0b\x1b[1m] \x7f\tc\n  # \x01").messages
+    assert message.fields[0].comment[:2] == ("a␀b␛ ␡ c", "␁")
+
+
 def test_keywords_are_names() -> None:
     assert fields_of(mapped("int8 message\nint8 from\nint8 class")) == {
         "Foo": ["int32 message", "int32 from", "int32 class"]

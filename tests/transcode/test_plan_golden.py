@@ -59,16 +59,16 @@ def golden(plan: Plan) -> str:
 
 
 def forms() -> str:
-    """Write each CDR form, and the protobuf types that its values and its arrays have."""
-    protobuf = {CdrForm.MESSAGE: {("message", "message")}}
+    """Write each CDR form, the protobuf types that its values and its arrays have, and the largest character."""
+    facts = {CdrForm.MESSAGE: {("message", "message", 0)}}
     for scalar in SCALARS.values():
         if scalar.cdr is not None:
-            protobuf.setdefault(scalar.cdr, set()).add((scalar.protobuf, scalar.many))
+            facts.setdefault(scalar.cdr, set()).add((scalar.protobuf, scalar.many, scalar.largest_character))
     text = ""
     for form in CdrForm:
-        ((one, many),) = protobuf[form]
+        ((one, many, largest_character),) = facts[form]
         types = (getattr(FieldDescriptor, f"TYPE_{each.upper()}") for each in (one, many))
-        text += f"{form.value} {form.name} {' '.join(map(str, types))}\n"
+        text += f"{form.value} {form.name} {' '.join(map(str, types))} {largest_character}\n"
     return text
 
 

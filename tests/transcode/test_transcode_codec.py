@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
+import itertools
 import pickle
+import sys
+import threading
+import warnings
+import weakref
 from typing import Any
 
 import pytest
@@ -12,7 +18,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from google.protobuf.wrappers_pb2 import StringValue
 from ros_types import describe, protobuf_class, struct_type
 
-from rosidl_adapter_proto.errors import ConversionError, SchemaError
+from rosidl_adapter_proto.errors import ConversionError, Error, SchemaError
 from rosidl_adapter_proto.transcode import Codec, TranscodeError, Transcoder, _core
 
 TIME = struct_type("test/msg/Time", seconds="int64", nanos="int16")
@@ -110,7 +116,9 @@ WRONG_FIELDS: dict[str, tuple[Any, type[Exception], str]] = {
         "test/msg/Time: no field is chosen; name one, or give no fields for all of them",
     ),
     "one text": ("nanos", TypeError, "fields must be a list of names, such as ['nanos'], not a text"),
-    "a number": (5, TypeError, "'int' object is not iterable"),
+    "a number": (5, TypeError, "from_cdr() takes fields as a list of names, not int"),
+    "numbers": ([5], TypeError, "from_cdr() takes fields as a list of names, and one of these is int"),
+    "lists": ([["nanos"]], TypeError, "from_cdr() takes fields as a list of names, and one of these is list"),
 }
 
 
@@ -122,22 +130,87 @@ def test_wrong_fields(case: str) -> None:
     assert str(caught.value) == text
 
 
-def test_wrong_arguments() -> None:
-    codec: Any = Codec(DESCRIPTION, Time)
-    for call in (codec.from_cdr, lambda: codec.from_cdr(CDR, field=["nanos"])):
-        with pytest.raises(TypeError, match=r"_from_cdr\(\) (missing 1 required|got an unexpected keyword)"):
-            call()
+WRONG_ARGUMENTS: dict[str, tuple[tuple[Any, ...], dict[str, Any], str]] = {
+    "none": ((), {}, "from_cdr() takes the data and perhaps fields, but 0 arguments were given"),
+    "only fields": (
+        (),
+        {"fields": ["nanos"]},
+        "from_cdr() takes the data and perhaps fields, but only fields were given",
+    ),
+    "three": (
+        (CDR, ["nanos"], 1),
+        {},
+        "from_cdr() takes the data and perhaps fields, but 3 arguments were given",
+    ),
+    "fields twice": (
+        (CDR, ["nanos"]),
+        {"fields": ["nanos"]},
+        "from_cdr() takes the data and perhaps fields, but 3 arguments were given",
+    ),
+    "another name": (
+        (CDR,),
+        {"field": ["nanos"]},
+        "from_cdr() has no argument 'field'; give fields=[...] to choose some",
+    ),
+    "data by name": ((), {"data": CDR}, "from_cdr() takes the data by position, as from_cdr(data)"),
+}
 
 
-def test_choices_are_remembered_and_forgotten() -> None:
+@pytest.mark.parametrize("case", WRONG_ARGUMENTS)
+def test_wrong_arguments(case: str) -> None:
+    arguments, named, text = WRONG_ARGUMENTS[case]
+    with pytest.raises(TypeError) as caught:
+        Codec(DESCRIPTION, Time).from_cdr(*arguments, **named)
+    assert str(caught.value) == text
+
+
+def test_choices_are_remembered_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is prepared once; many different ones do not take more and more memory."""
+    made: weakref.WeakSet[Transcoder] = weakref.WeakSet()
+
+    class Made(Transcoder):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            made.add(self)
+
     codec = Codec(DESCRIPTION, Time)
-    for _ in range(3):
-        codec.from_cdr(CDR, fields=["nanos"])
-    assert codec._of_fields.cache_info()[:2] == (2, 1)
+    monkeypatch.setattr("rosidl_adapter_proto.transcode.codec.Transcoder", Made)
+    for fields in (["nanos"], ("nanos",), iter(["nanos"])):
+        codec.from_cdr(CDR, fields=fields)
+    assert len(made) == 1
     for count in range(1, 200):
         codec.from_cdr(CDR, fields=["nanos"] * count)
-    assert codec._of_fields.cache_info().currsize == 64
+    assert 0 < len(made) <= 64
+
+
+def test_one_field_of_a_large_message_keeps_the_interpreter_lock() -> None:
+    """It takes less time than to give the lock away, and somebody else may keep it for long."""
+    types = struct_type("test/msg/Large", first="int32", data="uint8[]", last="int32")
+    large: Any = protobuf_class(types, "test/msg/Large")
+    codec = Codec(describe(types, "test/msg/Large"), large)
+    cdr = codec.to_cdr(large(first=1, data=bytes(1 << 20), last=2))
+    begin, ran = threading.Event(), threading.Event()
+
+    def other() -> None:
+        begin.wait()
+        ran.set()
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)
+    try:
+        begin.set()
+        for _ in range(1000):
+            assert codec.from_cdr(cdr, ["first"]).first == 1
+        assert not ran.is_set()
+    finally:
+        sys.setswitchinterval(interval)
+    thread.join()
+    assert codec.from_cdr(cdr, fields=["last"]) == large(last=2)
+    assert codec.from_cdr(cdr, fields=["data"]) == large(data=bytes(1 << 20))
+    with pytest.raises(TranscodeError, match=r"^test/msg/Large\.last at byte 1048588: 4 bytes are needed"):
+        codec.from_cdr(cdr[:-1], fields=["last"])
 
 
 def test_signatures_and_documentation() -> None:
@@ -165,6 +238,55 @@ def test_pickle() -> None:
     assert to_cdr(StringValue(value="a")) == b"\0\1\0\0\2\0\0\0a\0"
 
 
+ODD: tuple[Any, ...] = (
+    *(
+        None,
+        True,
+        1,
+        -1,
+        2**64,
+        2**70,
+        1.5,
+        "text",
+        "\ud800",
+        b"x",
+        bytearray(b"x"),
+        memoryview(b"abcd")[::2],
+    ),
+    *([], [1], [None], (b"",), {}, object(), int, len, Time, Time()),
+)
+
+
+def test_any_arguments_at_all() -> None:
+    """Whatever the native module is given, it takes or refuses it in the terms of Python."""
+    transcoder = Transcoder(DESCRIPTION, Time.DESCRIPTOR)
+    codec: Any = Codec(DESCRIPTION, Time)
+    calls: dict[Any, int] = {
+        _core.Transcoder: 3,
+        _core.Codec: 2,
+        _core.packed_fields: 3,
+        transcoder.cdr_to_proto: 1,
+        transcoder.proto_to_cdr: 1,
+        codec.to_cdr: 1,
+        codec.from_cdr: 2,
+    }
+    taken = 0
+    for call, count in calls.items():
+        for arguments in itertools.product((*ODD, transcoder), repeat=count):
+            with contextlib.suppress(
+                TypeError, ValueError, OverflowError, BufferError, AttributeError, Error
+            ):
+                call(*arguments)
+                taken += 1
+    for batch in (transcoder._cdr_to_proto_batch, transcoder._proto_to_cdr_batch):
+        for first, second in itertools.product(ODD, repeat=2):
+            for arguments in ((first, second, 1, None), ([], None, second, first), ([CDR], first, 1, second)):
+                with contextlib.suppress(TypeError, ValueError, OverflowError, BufferError, Error):
+                    batch(*arguments)
+                    taken += 1
+    assert taken > 0
+
+
 class Unfinished(Transcoder):
     """Does not call `__init__` of its base."""
 
@@ -175,6 +297,11 @@ class Unfinished(Transcoder):
 def test_odd_arguments() -> None:
     with pytest.raises(TypeError, match=r"^__init__ of the base class has not been called$"):
         Unfinished().cdr_to_proto(CDR)
+    with pytest.raises(TypeError, match=r"^__init__ of the base class has not been called$"):
+        _core.Codec(Unfinished(), Time)
+    with warnings.catch_warnings(), pytest.raises(TypeError):
+        warnings.simplefilter("ignore")  # nanobind warns as well
+        Unfinished().cdr_to_proto_batch([])
     with pytest.raises(TypeError, match="doesn't apply to a 'int' object"):
         Transcoder.cdr_to_proto(5, CDR)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"^serialize must return bytes$"):

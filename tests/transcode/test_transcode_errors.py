@@ -21,6 +21,7 @@ TYPES: Types = {
     **struct_type("test/msg/Flags", flag="boolean", flags="boolean[]"),
     **struct_type("test/msg/Text", text="string<3>", wide="wstring<3>", texts="string[]"),
     **struct_type("test/msg/Characters", chars="char[]", wide_chars="wchar[]"),
+    **struct_type("test/msg/Letter", letter="char"),
     **struct_type("test/msg/Numbers", a="uint8", b="int8", c="uint16", d="int16", many="uint16[]"),
     **struct_type(
         "test/msg/Sizes", array="double[3]", bounded="int32[<=2]", data="uint8[2]", names="string[2]"
@@ -134,10 +135,16 @@ FROM_CDR = {
         f".wide at byte 16: a UTF-16 code unit goes up to 65535 and this one is 65536; {TYPE}",
     ),
     "lone surrogate": (
-        "Text",
-        cdr("IIII", 0, 2, 65, 0xD800),
-        ".wide at byte 16: the text is not valid UTF-16: a surrogate stands alone;"
-        " encode the text as UTF-16LE",
+        "Characters",
+        cdr("IIHH", 0, 2, 65, 0xD800),
+        ".wide_chars[1] at byte 14: half of a surrogate pair stands alone, which text in protobuf cannot hold;"
+        " send both halves",
+    ),
+    "swapped surrogates": (
+        "Characters",
+        cdr("IIHHH", 0, 3, 65, 0xDC00, 0xD800),
+        ".wide_chars[1] at byte 14: half of a surrogate pair stands alone, which text in protobuf cannot hold;"
+        " send both halves",
     ),
     "wide too long": (
         "Text",
@@ -147,8 +154,12 @@ FROM_CDR = {
     "chars": (
         "Characters",
         cdr("I2s", 2, b"a\xc3"),
-        ".chars at byte 8: the text is not valid UTF-8;"
-        " encode it as UTF-8, or use bytes for what is not text",
+        f".chars[1] at byte 9: a char goes from 0 to 127 (ASCII) and this one is 195; {TYPE}",
+    ),
+    "char": (
+        "Letter",
+        cdr("B", 200),
+        f".letter at byte 4: a char goes from 0 to 127 (ASCII) and this one is 200; {TYPE}",
     ),
     "sequence bound": (
         "Sizes",
@@ -172,13 +183,20 @@ FROM_PROTO = {
         f" at byte 0: field number 1 has wire type 6, which protobuf does not have; {DAMAGED}",
     ),
     **{
-        f"group {wire_type}": (
+        f"group {case}": (
             "Point",
-            tag(7, wire_type),
-            " at byte 0: field number 7 is a group, which proto3 does not have;"
-            " serialize the message with a proto3 schema",
+            group,
+            f" at byte {place}: the group of field number 7 has no end, no beginning or too many groups inside;"
+            f" {DAMAGED}",
         )
-        for wire_type in (GROUP_START, GROUP_END)
+        for case, (group, place) in {
+            "without end": (tag(7, GROUP_START) + number(1, 5), 1),
+            "without beginning": (tag(7, GROUP_END), 0),
+            "of another end": (tag(7, GROUP_START) + tag(8, GROUP_END), 1),
+            "cut off": (tag(7, GROUP_START) + b"\x0a\5abc", 1),
+            "with a wrong tag": (tag(7, GROUP_START) + b"\0" + tag(7, GROUP_END), 1),
+            "too deep": (tag(7, GROUP_START) * 101 + tag(7, GROUP_END) * 101, 1),
+        }.items()
     },
     "cut number": (
         "Point",
@@ -222,11 +240,32 @@ FROM_PROTO = {
         ".wide at byte 2: 3 bytes are no UTF-16, which has 2 bytes for each code unit;"
         " encode the text as UTF-16LE",
     ),
+    "char": (
+        "Letter",
+        number(1, 200),
+        ".letter at byte 1: 200 does not fit char; give a number from 0 to 127 (ASCII)",
+    ),
+    "large char": (
+        "Letter",
+        number(1, 256),
+        ".letter at byte 1: 256 does not fit char; give a number from 0 to 127 (ASCII)",
+    ),
+    "chars": (
+        "Characters",
+        delimited(1, "aé".encode()),
+        ".chars[1] at byte 3: 233 does not fit char; give a number from 0 to 127 (ASCII)",
+    ),
+    "bad UTF-8 in chars": (
+        "Characters",
+        delimited(1, b"a\xff"),
+        ".chars at byte 3: the text is not valid UTF-8;"
+        " encode it as UTF-8, or use bytes for what is not text",
+    ),
     "lone surrogate": (
-        "Text",
-        delimited(2, b"a\0\x00\xd8"),
-        ".wide at byte 4: the text is not valid UTF-16: a surrogate stands alone;"
-        " encode the text as UTF-16LE",
+        "Characters",
+        delimited(2, b"a\xed\xa0\x80"),
+        ".wide_chars at byte 3: the text is not valid UTF-8;"
+        " encode it as UTF-8, or use bytes for what is not text",
     ),
     "repeated string": (
         "Text",

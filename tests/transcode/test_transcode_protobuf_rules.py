@@ -7,7 +7,7 @@ import struct
 import pytest
 from reference_cdr import write_cdr
 from ros_types import struct_type, transcoder
-from wire import DELIMITED, VARINT, delimited, double, fixed32, number, tag, varint
+from wire import DELIMITED, GROUP_END, GROUP_START, VARINT, delimited, double, fixed32, number, tag, varint
 
 TYPES = {
     **struct_type("test/msg/Point", x="double", y="double", label="string"),
@@ -41,6 +41,18 @@ DEFAULT = {
 }
 
 UNKNOWN = b"".join((number(900, 5), double(901, 1.5), fixed32(902, 7), delimited(903, b"whatever")))
+GROUP = b"".join(
+    (
+        tag(904, GROUP_START),
+        UNKNOWN,
+        number(SMALL, 5),
+        tag(SMALL, GROUP_START),
+        tag(905, GROUP_START),
+        tag(905, GROUP_END),
+        tag(SMALL, GROUP_END),
+        tag(904, GROUP_END),
+    )
+)
 LONG = struct.pack("<q", 5)
 
 RULES = {
@@ -130,6 +142,25 @@ RULES = {
     ),
     "an absent array": (delimited(PAIR, fixed32(FIRST, 1)), {"pair": {**NO_PAIR, "first": 1}}),
     "text of several bytes": (delimited(TEXT, "é€😀".encode()), {"text": "é€😀"}),
+    "groups are unknown": (GROUP + number(SMALL, 1) + GROUP, {"small": 1}),
+    "groups inside": (delimited(POINT, GROUP, double(X, 1.0), GROUP), {"point": {**NO_POINT, "x": 1.0}}),
+    "groups between repeated fields": (
+        number(SHORTS, 1) + GROUP + number(SHORTS, 2) + GROUP + delimited(NAMES, b"a") + GROUP,
+        {"shorts": [1, 2], "names": ["a"]},
+    ),
+    "groups between pieces": (
+        delimited(POINT, double(X, 1.0)) + GROUP + delimited(POINT, GROUP, double(Y, 2.0)),
+        {"point": {**NO_POINT, "x": 1.0, "y": 2.0}},
+    ),
+    "a group with the number of a field is unknown": (
+        tag(SMALL, GROUP_START) + number(SMALL, 5) + tag(SMALL, GROUP_END),
+        {},
+    ),
+    "groups as deep as protobuf reads them": (tag(904, GROUP_START) * 99 + tag(904, GROUP_END) * 99, {}),
+    "lone surrogates": (
+        delimited(WIDE, b"\x00\xdca\0\x3d\xd8\x3d\xd8\x00\xde\x00\xd8"),
+        {"wide": "\udc00a\ud83d\U0001f600\ud800"},
+    ),
     "wide text": (delimited(WIDE, "é😀".encode("utf-16-le")), {"wide": "é😀"}),
 }
 

@@ -112,8 +112,9 @@ struct NumberForm {
   static constexpr bool kIsText = many == ProtobufForm::String;
   static constexpr bool kIsOneValue = kIsText || many == ProtobufForm::Bytes;
 
-  // What forms may have otherwise: whether the bytes of an array are the same on the other side, whether all
-  // bits are a value in CDR, and the texts of errors.
+  // What forms may have otherwise: the largest character, whether the bytes of an array are the same on the
+  // other side, whether all bits are a value in CDR, and the texts of errors.
+  static constexpr uint64_t kLargestCharacter = 0;
   static constexpr bool kCopiesToProtobuf = false, kCopiesToCdr = false;
   static constexpr bool kTakesAll = true;
   static constexpr bool is_value(Raw) { return true; }
@@ -164,6 +165,7 @@ struct StringForm {
   static constexpr ProtobufForm kSingle = form, kMany = form;
   static constexpr uint64_t kSize = 0, kMinimumSize = 4;  // in CDR
   static constexpr uint64_t kUnitSize = unit_size, kTerminator = terminator;
+  static constexpr uint64_t kLargestCharacter = 0;
   static constexpr const char *kValues = "", *kRange = "";
 };
 
@@ -198,10 +200,20 @@ struct Form<CdrForm::Int8> : SmallForm<int8_t, ProtobufForm::Bytes> {
   static constexpr const char* kRange = "int8; give a number from -128 to 127";
 };
 
-// 1 byte | uint32, arrays: string
+// 1 byte, an ASCII character | uint32, arrays: string
 template <>
 struct Form<CdrForm::Char> : SmallForm<uint8_t, ProtobufForm::String> {
-  static constexpr const char* kRange = Form<CdrForm::Uint8>::kRange;
+  static constexpr uint64_t kLargestCharacter = 0x7f;  // interfaces/scalars.py says why
+  static constexpr bool kTakesAll = false;
+  static constexpr bool is_value(uint8_t raw) { return raw <= kLargestCharacter; }
+  static constexpr const char* kValues = "a char goes from 0 to 127 (ASCII)";
+  static constexpr const char* kRange = "char; give a number from 0 to 127 (ASCII)";
+  static constexpr bool from_wire(uint64_t value, uint8_t* raw, int64_t* refused) {
+    if (!SmallForm::from_wire(value, raw, refused)) return false;
+    if (is_value(*raw)) return true;
+    *refused = *raw;
+    return false;
+  }
 };
 
 // 2 bytes | uint32
@@ -219,6 +231,7 @@ struct Form<CdrForm::Int16> : SmallForm<int16_t, ProtobufForm::Int32> {
 // 2 bytes, a UTF-16 code unit (Fast CDR 2) | uint32, arrays: string
 template <>
 struct Form<CdrForm::Wchar> : SmallForm<uint16_t, ProtobufForm::String> {
+  static constexpr uint64_t kLargestCharacter = 0xffff;
   static constexpr const char* kRange = Form<CdrForm::Uint16>::kRange;
 };
 
@@ -251,6 +264,7 @@ template <>
 struct Form<CdrForm::Message> {
   static constexpr bool kIsNumber = false, kIsString = false;
   static constexpr ProtobufForm kSingle = ProtobufForm::Message, kMany = ProtobufForm::Message;
+  static constexpr uint64_t kLargestCharacter = 0;
   static constexpr const char *kValues = "", *kRange = "";
 };
 

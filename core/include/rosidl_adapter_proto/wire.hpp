@@ -70,4 +70,44 @@ inline const uint8_t* get_varint(const uint8_t* p, const uint8_t* end, uint64_t*
   return nullptr;
 }
 
+// As many groups as protobuf's own parsers let stand inside of each other.
+constexpr int kMaximumGroups = 100;
+
+const uint8_t* skip_group(const uint8_t* p, const uint8_t* end, uint64_t number, int depth = 1);
+
+// Skips what follows the tag of an unknown field. Returns nullptr if that does not end properly before `end`.
+inline const uint8_t* skip_value(const uint8_t* p, const uint8_t* end, uint64_t tag, int depth = 0) {
+  uint64_t size = 0;
+  switch (tag & 7) {
+    case 0:
+      return get_varint(p, end, &size);
+    case 1:
+      size = 8;
+      break;
+    case 2:
+      p = get_varint(p, end, &size);
+      break;
+    case 3:
+      return skip_group(p, end, tag >> 3, depth + 1);
+    case 5:
+      size = 4;
+      break;
+    default:
+      return nullptr;
+  }
+  return p != nullptr && size <= static_cast<uint64_t>(end - p) ? p + size : nullptr;
+}
+
+// Skips the rest of a group, with its end, which has the field number of its beginning
+// (https://protobuf.dev/programming-guides/encoding/#groups).
+inline const uint8_t* skip_group(const uint8_t* p, const uint8_t* end, uint64_t number, int depth) {
+  uint64_t tag;
+  while (p != nullptr && depth <= kMaximumGroups && (p = get_varint(p, end, &tag)) != nullptr) {
+    if (tag > 0xffffffff || tag < 8) return nullptr;
+    if ((tag & 7) == 4) return tag >> 3 == number ? p : nullptr;
+    p = skip_value(p, end, tag, depth);
+  }
+  return nullptr;
+}
+
 }  // namespace rosidl_proto

@@ -6,6 +6,8 @@ The grammar is in `grammar.lark`. What ROS 2's own `rosidl_parser` accepts is ac
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rosidl_adapter_proto.interfaces.idl.definitions import read_definitions
 from rosidl_adapter_proto.interfaces.idl.file import File
 from rosidl_adapter_proto.interfaces.idl.interface import read_interface
@@ -33,4 +35,5 @@ def parse_idl(text: str, name: TypeName, file: str) -> Interface:
         message = f"the file is longer than {MAX_CHARACTERS} characters"
         raise problem(message, content.text, Location(file, 1))
     read_definitions(content, (), syntax_tree(content).children)
-    return read_interface(content, name, text)
+    interface = read_interface(content, name, text)
+    return replace(interface, warnings=tuple(dict.fromkeys(content.warnings)))

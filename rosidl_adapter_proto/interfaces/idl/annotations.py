@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rosidl_adapter_proto.interfaces.idl.expressions import evaluated, named_value
+from rosidl_adapter_proto.interfaces.idl.expressions import named_value, parameter_value
 from rosidl_adapter_proto.interfaces.idl.file import File, FullName, Node
 from rosidl_adapter_proto.interfaces.idl.names import plain_name
 from rosidl_adapter_proto.interfaces.model import Annotation, ScalarValue
@@ -55,4 +55,4 @@ def _parameter(file: File, scope: FullName, node: Node, mask: int | None) -> tup
     if not isinstance(single, str) and single is not None and single.data == "scoped_name":
         value = named_value(file, scope, single)
         return plain_name(name), "".join(single.children) if value is None else value
-    return plain_name(name), evaluated(file, scope, expression, mask)
+    return plain_name(name), parameter_value(file, scope, expression, mask)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rosidl_adapter_proto.interfaces.idl.annotations import read_notes
-from rosidl_adapter_proto.interfaces.idl.expressions import complement_mask, evaluated
+from rosidl_adapter_proto.interfaces.idl.expressions import complement_mask, constant_value
 from rosidl_adapter_proto.interfaces.idl.file import MAX_NESTING, File, FullName, Node, Type, placed
 from rosidl_adapter_proto.interfaces.idl.names import plain_name
 from rosidl_adapter_proto.interfaces.idl.types import declared_type, read_type
@@ -33,7 +33,7 @@ def _read_constant(file: File, scope: FullName, node: Node) -> None:
     if not isinstance(type, (BasicType, StringType)):  # rule 6
         message = f"constant '{identifier}' must be a number, a boolean, a character or a string"
         raise file.problem(message, type_node)
-    value = evaluated(file, scope, expression, complement_mask(type))
+    value = constant_value(file, scope, expression, complement_mask(type))
     with placed(file, expression, f"constant '{identifier}': "):
         value = fitted(value, type)
     path = (*scope, plain_name(identifier))

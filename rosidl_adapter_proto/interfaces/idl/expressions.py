@@ -17,6 +17,11 @@ from rosidl_adapter_proto.interfaces.idl.literals import (
 )
 from rosidl_adapter_proto.interfaces.idl.mistakes import Mistake, quoted, shown
 from rosidl_adapter_proto.interfaces.idl.names import candidates, scoped_name
+from rosidl_adapter_proto.interfaces.idl.rosidl_parser import (
+    complemented_literal,
+    parameter_part,
+    size_literal,
+)
 from rosidl_adapter_proto.interfaces.model import ScalarValue, TypeName, ValueType
 from rosidl_adapter_proto.interfaces.scalars import Family
 
@@ -47,12 +52,28 @@ def evaluated(
     return items[0]  # type: ignore[no-any-return]
 
 
+def constant_value(file: File, scope: FullName, expression: Node, mask: int | None) -> ScalarValue:
+    """Return the value of a constant; `mask` is that of `evaluated`."""
+    value = evaluated(file, scope, expression, mask)
+    literal = complemented_literal(expression)
+    return value if literal is None else file.as_in_ros(int(literal), value, expression)
+
+
+def parameter_value(file: File, scope: FullName, expression: Node, mask: int | None) -> ScalarValue:
+    """Return the value of an annotation's parameter; `mask` is that of `evaluated`."""
+    value, part = evaluated(file, scope, expression, mask), parameter_part(expression)
+    literal = complemented_literal(part)
+    read = evaluated(file, scope, part, mask) if literal is None else int(literal)
+    return file.as_in_ros(read, value, expression)
+
+
 def positive(file: File, scope: FullName, expression: Node) -> int:
     """Return the value of an array size or a bound (rule 19)."""
     value = evaluated(file, scope, expression)
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
         raise file.problem(f"expected a whole number above 0, not {shown(value)}", expression)
-    return value
+    read = int(size_literal(expression) or 0)
+    return int(file.as_in_ros(read, value, expression)) if read else value
 
 
 def complement_mask(type: ValueType) -> int | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rosidl_adapter_proto.errors import DefinitionError
-from rosidl_adapter_proto.interfaces.idl.mistakes import Mistake
+from rosidl_adapter_proto.interfaces.idl.mistakes import Mistake, shown
 from rosidl_adapter_proto.interfaces.model import Constant, FieldType, Location, ScalarValue
 from rosidl_adapter_proto.interfaces.problem import problem
 
@@ -37,6 +37,7 @@ class File:
         typedefs: Typedefs by their last name, since `rosidl_parser` finds them from every scope.
         messages: Where a name that was not defined before is taken for a message.
         values: The values of constants and enumerators.
+        warnings: What the user should know, each with its place.
     """
 
     text: str
@@ -47,6 +48,7 @@ class File:
     messages: dict[FullName, Node] = field(default_factory=dict)
     constants: dict[FullName, Constant] = field(default_factory=dict)
     values: dict[FullName, ScalarValue] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
 
     def location(self, node: Node) -> Location:
         """Return where the first token of a tree stands."""
@@ -58,6 +60,15 @@ class File:
         """Return the error for a mistake at a tree, a token or a location."""
         location = place if isinstance(place, Location) else self.location(place)
         return problem(message, self.text, location)
+
+    def as_in_ros(self, read: ScalarValue, value: ScalarValue, place: Node) -> ScalarValue:
+        """Return the value that ROS 2 reads in an expression, and warn if it is not the one that OMG IDL has."""
+        if read != value:
+            self.warnings.append(
+                f"{self.location(place)}: ROS 2 reads {shown(read)} here, where OMG IDL has {shown(value)}, and so "
+                "it is generated: its parser does not calculate; write a single number"
+            )
+        return read
 
 
 @contextmanager

@@ -8,8 +8,17 @@ from collections.abc import Callable
 from rosidl_adapter_proto.interfaces.idl.expressions import positive
 from rosidl_adapter_proto.interfaces.idl.file import File, FullName, Node, Type
 from rosidl_adapter_proto.interfaces.idl.names import candidates, scoped_name
+from rosidl_adapter_proto.interfaces.idl.rosidl_parser import size_literal
 from rosidl_adapter_proto.interfaces.idl.syntax import BASIC_TYPES
-from rosidl_adapter_proto.interfaces.model import NAMESPACES, ArrayType, SequenceType, StringType, TypeName
+from rosidl_adapter_proto.interfaces.model import (
+    NAMESPACES,
+    ArrayType,
+    FieldType,
+    SequenceType,
+    StringType,
+    TypeName,
+)
+from rosidl_adapter_proto.interfaces.problem import wide_string_warning
 
 _PATH_LENGTH = len(dataclasses.fields(TypeName))
 
@@ -51,7 +60,22 @@ def _sequence_type(file: File, scope: FullName, node: Node) -> Type:
     if isinstance(element.type, (ArrayType, SequenceType)):
         raise file.problem(message.format(_plural(element.type)), node)
     size = positive(file, scope, bound[1]) if len(bound) > 1 else None
+    if size is None and element_node.data == "wide_string_type" and len(element_node.children) > 1:
+        size = _bound_as_in_ros(file, element_node, element.type)
     return element._replace(type=SequenceType(element.type, size))
+
+
+def _bound_as_in_ros(file: File, node: Node, element: FieldType) -> int | None:
+    """Return the bound that `rosidl_parser` gives to a sequence of wide strings: that of the strings, by mistake.
+
+    It is what is installed and hashed. Where a name or an expression stands for it, ROS 2 refuses the definition.
+    """
+    assert isinstance(element, StringType)
+    expression = node.children[2]
+    if element.bound is None or size_literal(expression) is None:
+        return None
+    file.warnings.append(f"{file.location(node)}: {wide_string_warning(element.bound)}")
+    return element.bound
 
 
 def _named_type(file: File, scope: FullName, node: Node) -> Type:

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.adapter.contract import constant_name
-from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines, plain_lines
-from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer
+from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines
+from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer, method
 from rosidl_adapter_proto.generate.targets.python.names import Names
 from rosidl_adapter_proto.interfaces.model import Interface, TypeName
-from rosidl_adapter_proto.schema.conversion import has_defaults, message_conversion, ros_class
-from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue
+from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
+from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue, plain_lines
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,11 @@ class AdapterConstant:
 
 @dataclass(frozen=True)
 class MessageAdapter:
-    """The adapter class of one message."""
+    """The adapter class of one message.
+
+    Attributes:
+        set_in_parent: The call that makes the protobuf message present where it is nested.
+    """
 
     class_name: str
     custom: str
@@ -55,6 +59,7 @@ class MessageAdapter:
     constants: tuple[AdapterConstant, ...]
     packed_numbers: tuple[int, ...]
     fields: tuple[AdapterField, ...]
+    set_in_parent: str
     defaults: str
     has_defaults: bool
 
@@ -93,7 +98,7 @@ def message_adapter(
 ) -> MessageAdapter:
     """Decide what the adapter of a message of an interface is."""
     conversion = message_conversion(proto)
-    lines = {field.name: writer.lines(field, how) for field, how in conversion.fields}
+    lines = {field.name: writer.lines(proto, field, how) for field, how in conversion.fields}
     return MessageAdapter(
         class_name=names.adapter(proto.type_name),
         custom=proto.name,
@@ -103,7 +108,9 @@ def message_adapter(
         ros_class=ros_class(proto.type_name, interface),
         comment=docstring_lines(proto.source.comment),
         constants=tuple(
-            AdapterConstant(constant_name(each.name), _literal(each.value), plain_lines(each.comment))
+            AdapterConstant(
+                constant_name(each.name, proto.name), _literal(each.value), tuple(plain_lines(each.comment))
+            )
             for each in proto.constants
         ),
         packed_numbers=conversion.packed_numbers,
@@ -111,6 +118,7 @@ def message_adapter(
             AdapterField(each.name, _field_info(each, writer.adapter_names), *lines.get(each.name, ((), ())))
             for each in proto.fields
         ),
+        set_in_parent=method(proto, "SetInParent"),
         defaults=_defaults(proto),
         has_defaults=has_defaults(proto.source, names.catalog.message),
     )
@@ -126,23 +134,17 @@ def _field_info(field: ProtoField, adapter_names: Mapping[TypeName, str]) -> str
     return ", ".join(map(str, arguments))
 
 
-_GROUPS = {
-    "request": ("ServiceAdapter", ("request", "response")),
-    "goal": ("ActionAdapter", ("goal", "result", "feedback")),
-}
-"""The base class of a group, and the parts that it is parametrized with, by the first part."""
-
-
 def group_adapter(
     name: TypeName, group: Mapping[str, TypeName], interface: Interface, names: Names
 ) -> GroupAdapter:
     """Decide what the class is that groups the adapters of a service or an action of an interface."""
-    base, parameters = _GROUPS[next(iter(group))]
     return GroupAdapter(
         name=name.name,
         class_name=names.adapter(name),
-        base=base,
-        custom_types=tuple((part.capitalize(), group[part].name) for part in parameters),
+        base="ServiceAdapter" if "request" in group else "ActionAdapter",
+        custom_types=tuple(
+            (NAMED_PARTS[part], each.name) for part, each in group.items() if part in NAMED_PARTS
+        ),
         type_name=str(name),
         type_hash=names.catalog.hash(name),
         ros_class=ros_class(name, interface),

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-
-def plain_lines(lines: Iterable[str]) -> tuple[str, ...]:
-    return tuple(part.rstrip() for line in lines for part in line.splitlines() or [""])
+from rosidl_adapter_proto.schema.proto import plain_lines
 
 
 def docstring_lines(lines: Iterable[str]) -> tuple[str, ...]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import keyword
 from collections.abc import Callable, Mapping
 
 from rosidl_adapter_proto import adapter
+from rosidl_adapter_proto.adapter.contract import is_plain_field
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.schema.conversion import (
     Carrier,
@@ -18,7 +18,7 @@ from rosidl_adapter_proto.schema.conversion import (
     Steps,
     Values,
 )
-from rosidl_adapter_proto.schema.proto import ProtoField
+from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage
 
 Lines = tuple[str, ...]
 
@@ -39,8 +39,10 @@ class Writer:
         self.adapter_names = adapter_names
         self.helpers: set[str] = set()
 
-    def lines(self, field: ProtoField, conversion: FieldConversion) -> tuple[Lines, Lines]:
-        """Return the lines that convert a field, to protobuf and to ROS."""
+    def lines(
+        self, message: ProtoMessage, field: ProtoField, conversion: FieldConversion
+    ) -> tuple[Lines, Lines]:
+        """Return the lines that convert a field of a message, to protobuf and to ROS."""
         match conversion:
             case OneMessage():
                 return self._one_message(field, conversion)
@@ -49,7 +51,7 @@ class Writer:
             case Messages():
                 return self._messages(field, conversion)
             case Numbers():
-                return self._numbers(field, conversion)
+                return self._numbers(message, field, conversion)
             case Compact():
                 return self._compact(field, conversion)
             case Values():
@@ -76,7 +78,7 @@ class Writer:
             messages = self._call(adapter.ros_messages, nested, received)
         return (to_custom,), (_assign(field, messages),)
 
-    def _numbers(self, field: ProtoField, conversion: Numbers) -> tuple[Lines, Lines]:
+    def _numbers(self, message: ProtoMessage, field: ProtoField, conversion: Numbers) -> tuple[Lines, Lines]:
         source, target = _read("source", field), _read("message", field)
         checked = self._after(conversion.length.to_custom, source)
         values = self._call(adapter.numbers, checked, _quoted(conversion.typecode))
@@ -84,7 +86,8 @@ class Writer:
             case Carrier.BYTES:
                 to_custom = _assign(field, f"{values}.tobytes()")
             case Carrier.FIXED:
-                to_custom = f"message.MergeFromString({self._call(adapter.packed, field.number, values)})"
+                packed = self._call(adapter.packed, field.number, values)
+                to_custom = method(message, "MergeFromString", packed)
             case Carrier.VARINTS:
                 to_custom = f"{target}.extend({values}.tolist())"
         if conversion.size is not None:
@@ -150,6 +153,13 @@ class Writer:
         return helper.__name__
 
 
+def method(message: ProtoMessage, name: str, *arguments: str) -> str:
+    """Return the call of a method of a protobuf message, which a field of the same name would hide."""
+    if any(each.name == name for each in message.fields):
+        return f"type(message).{name}({', '.join(('message', *arguments))})"
+    return f"message.{name}({', '.join(arguments)})"
+
+
 def _or_zeros(values: str, conversion: Compact | Values) -> str:
     """Return the values of a field that ROS has in Python; of an array that protobuf has not, zeros."""
     if conversion.size is None:
@@ -163,10 +173,10 @@ def _quoted(text: str) -> str:
 
 
 def _read(owner: str, field: ProtoField) -> str:
-    return f'getattr({owner}, "{field.name}")' if keyword.iskeyword(field.name) else f"{owner}.{field.name}"
+    return f"{owner}.{field.name}" if is_plain_field(field.name) else f'getattr({owner}, "{field.name}")'
 
 
 def _assign(field: ProtoField, value: str) -> str:
-    if keyword.iskeyword(field.name):
-        return f'setattr(message, "{field.name}", {value})'
-    return f"message.{field.name} = {value}"
+    if is_plain_field(field.name):
+        return f"message.{field.name} = {value}"
+    return f'setattr(message, "{field.name}", {value})'

@@ -6,10 +6,8 @@ Each interface gets three modules: `<Name>_pb2.py` with the protobuf classes, `<
 
 from __future__ import annotations
 
-import keyword
 from dataclasses import dataclass
 
-from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.generate.targets.python.adapters import (
     GroupAdapter,
     MessageAdapter,
@@ -17,7 +15,7 @@ from rosidl_adapter_proto.generate.targets.python.adapters import (
     message_adapter,
 )
 from rosidl_adapter_proto.generate.targets.python.conversions import Writer
-from rosidl_adapter_proto.generate.targets.python.names import Names
+from rosidl_adapter_proto.generate.targets.python.names import Names, check_module_names
 from rosidl_adapter_proto.generate.targets.python.stubs import StubMessage, stub, stub_alias
 from rosidl_adapter_proto.interfaces.model import TypeName, parts, references
 from rosidl_adapter_proto.schema.proto import ProtoFile
@@ -68,12 +66,10 @@ def python_modules(file: ProtoFile, names: Names) -> PythonModules:
     """Decide what the Python modules of a `.proto` file are.
 
     Raises:
-        SchemaError: A name is a keyword of Python.
+        SchemaError: A name is a keyword of Python, or one that the modules use themselves.
     """
     source = file.source
-    for part in (source.name.package, source.name.name):
-        if keyword.iskeyword(part):
-            raise SchemaError(f"{source.name}: {part!r} is a keyword of Python; rename it")
+    check_module_names(source.name)
     adapter_names = _local_adapter_names(file, names)
     writer = Writer(adapter_names)
     adapters = tuple(message_adapter(each, source, names, writer) for each in file.messages)

@@ -2,11 +2,40 @@
 
 from __future__ import annotations
 
+import keyword
 from dataclasses import dataclass
 
+from rosidl_adapter_proto import adapter
+from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.model import TypeName, parts
 from rosidl_adapter_proto.schema.proto import ProtoFile
+
+_NAMES_IN_MODULES = frozenset(
+    {
+        *(name for name in adapter.__all__ if name.islower()),
+        *("adapter", "float", "getattr", "list", "setattr", "staticmethod", "type", "typing"),
+        *("arrays", "destination", "error", "field", "message", "source", "type_name"),
+        *("DESCRIPTOR", "annotations"),
+    }
+)
+"""What generated modules call something themselves, so that no interface can be called so; `.idl` files might try."""
+
+
+def check_module_names(name: TypeName) -> None:
+    """Check that an interface can have Python modules, with classes of its name.
+
+    Raises:
+        SchemaError: It cannot.
+    """
+    for part in (name.package, name.name):
+        if keyword.iskeyword(part):
+            raise SchemaError(f"{name}: {part!r} is a keyword of Python; rename it")
+    if name.name in _NAMES_IN_MODULES:
+        raise SchemaError(
+            f"{name}: generated modules use the name {name.name!r} themselves; "
+            "rename the interface, in ROS's style with an upper case letter first"
+        )
 
 
 @dataclass(frozen=True)

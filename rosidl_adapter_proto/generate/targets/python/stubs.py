@@ -6,6 +6,7 @@ import keyword
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from rosidl_adapter_proto.adapter.contract import is_plain_field
 from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines
 from rosidl_adapter_proto.generate.targets.python.names import Names
 from rosidl_adapter_proto.interfaces.model import Interface, TypeName
@@ -26,7 +27,10 @@ class StubField:
 
 @dataclass(frozen=True)
 class StubMessage:
-    """A message class in the type stub; fields named like keywords of Python are only in `all_names`."""
+    """A message class in the type stub; fields named like keywords of Python are only in `all_names`.
+
+    Fields named like attributes of every protobuf message are arguments of the constructor only.
+    """
 
     name: str
     comment: tuple[str, ...]
@@ -37,12 +41,12 @@ class StubMessage:
     @property
     def attributes(self) -> tuple[StubField, ...]:
         """The fields that are plain attributes."""
-        return tuple(each for each in self.fields if each.is_attribute)
+        return tuple(each for each in self.fields if each.is_attribute and is_plain_field(each.name))
 
     @property
     def properties(self) -> tuple[StubField, ...]:
         """The fields that cannot be assigned: messages and repeated fields."""
-        return tuple(each for each in self.fields if not each.is_attribute)
+        return tuple(each for each in self.fields if not each.is_attribute and is_plain_field(each.name))
 
     @property
     def message_fields(self) -> tuple[StubField, ...]:
