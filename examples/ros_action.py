@@ -4,44 +4,38 @@ import time
 
 import rclpy
 from rclpy.executors import MultiThreadedExecutor
-from rosidl_proto.test_msgs.action import (
-    Fibonacci_Feedback,
-    Fibonacci_FeedbackMessage,
-    Fibonacci_Goal,
-    Fibonacci_Result,
-    FibonacciAdapter,
-)
+from rosidl_proto.test_msgs.action import Fibonacci, Fibonacci_FeedbackMessage
 
 from rosidl_adapter_proto.ros import ActionClient, ActionServer, Node, ServerGoalHandle
 
-GoalHandle = ServerGoalHandle[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback]
+GoalHandle = ServerGoalHandle[Fibonacci.Goal, Fibonacci.Result, Fibonacci.Feedback]
 
 
-class Fibonacci(Node):
+class Sequences(Node):
     def __init__(self) -> None:
-        super().__init__("fibonacci")
-        self.server = ActionServer(self, FibonacciAdapter, "fibonacci", self.execute)
-        self.client = ActionClient(self, FibonacciAdapter, "fibonacci")
+        super().__init__("sequences")
+        self.server = ActionServer(self, Fibonacci, "fibonacci", self.execute)
+        self.client = ActionClient(self, Fibonacci, "fibonacci")
 
-    def execute(self, goal_handle: GoalHandle) -> Fibonacci_Result:
+    def execute(self, goal_handle: GoalHandle) -> Fibonacci.Result:
         sequence = [0, 1]
         while len(sequence) <= goal_handle.request.order:
             sequence.append(sequence[-1] + sequence[-2])
-            goal_handle.publish_feedback(Fibonacci_Feedback(sequence=sequence))
+            goal_handle.publish_feedback(Fibonacci.Feedback(sequence=sequence))
             time.sleep(0.1)
         goal_handle.succeed()
-        return Fibonacci_Result(sequence=sequence)
+        return Fibonacci.Result(sequence=sequence)
 
     def on_feedback(self, message: Fibonacci_FeedbackMessage) -> None:
         self.get_logger().info(f"Feedback: {list(message.feedback.sequence)}")
 
 
 def main() -> None:
-    node, executor = Fibonacci(), MultiThreadedExecutor()
+    node, executor = Sequences(), MultiThreadedExecutor()
     executor.add_node(node)
     if not node.client.wait_for_server(timeout_sec=10):
         raise SystemExit("There is no server")
-    goal_future = node.client.send_goal_async(Fibonacci_Goal(order=10), node.on_feedback)
+    goal_future = node.client.send_goal_async(Fibonacci.Goal(order=10), node.on_feedback)
     executor.spin_until_future_complete(goal_future, timeout_sec=10)
     goal_handle = goal_future.result()
     if goal_handle is None or not goal_handle.accepted:

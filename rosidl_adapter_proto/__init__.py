@@ -10,6 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rosidl_adapter_proto.adapter.runtime import adapter_for
     from rosidl_adapter_proto.errors import (
         ConversionError,
         DefinitionError,
@@ -42,12 +43,13 @@ __all__ = [
     "Schema",
     "SchemaError",
     "TypeRegistry",
+    "adapter_for",
     "compute_proto_field_number",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    for module in ("errors", "schema.typemap", "schema.numbering", "schema.registry"):
+    for module in ("errors", "schema.typemap", "schema.numbering", "schema.registry", "adapter.runtime"):
         if name in __all__ and hasattr(imported := importlib.import_module(f"{__name__}.{module}"), name):
             return getattr(imported, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -41,7 +41,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture(scope="session")
-def things(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
+def generated_things(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
     """The package `things`, generated and imported."""
     folder = generate_things(tmp_path_factory.mktemp("things_root"))
     sys.path.insert(0, str(folder / "python"))
@@ -50,6 +50,12 @@ def things(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace
     }
     yield SimpleNamespace(folder=folder, **modules)
     sys.path.remove(str(folder / "python"))
+
+
+@pytest.fixture
+def things(generated_things: SimpleNamespace) -> SimpleNamespace:
+    """The package `things`, as it is tested: generated and imported, unless a test has something else in its place."""
+    return generated_things
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ FLOORS = {
     "ros": 5,
     "hooks": 7,
     "cli": 8,
+    "time": 1,
     "errors": 0,
 }
 ENTRANCES = ("__init__", "__main__")

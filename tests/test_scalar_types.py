@@ -6,6 +6,7 @@ import importlib
 from array import array
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,8 +15,8 @@ import numpy
 import pytest
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto
 
-from rosidl_adapter_proto import TypeRegistry
-from rosidl_adapter_proto.errors import ConversionError, DefinitionError
+from rosidl_adapter_proto import TypeRegistry, adapter_for
+from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.description import described_type, field_type_description
@@ -133,160 +134,69 @@ def test_protobuf_fields_and_descriptors(row: Scalar, field_type: FieldType) -> 
 
 
 @pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
-def test_values_in_protobuf(row: Scalar, tmp_path: Path) -> None:
-    """A protobuf class takes default values as protobuf fields have them, the smallest and the largest ones."""
+def test_from_definitions_to_cdr(row: Scalar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A value goes from protobuf to ROS and back, and through CDR if the type has a form there.
+
+    It does so in every form of a field, under every name that a definition may use, in `.msg` and in `.idl`, and with
+    adapters that are generated and ones that are made at run time.
+    """
     package = f"scalars_{row.name.replace(' ', '_')}"
-    field_types = list(dict(idl_spellings(row)))
-    members = " ".join(
-        line.replace(" a", f" a{number}") for number, line in enumerate(dict(idl_spellings(row)).values())
-    )
-    text = f"module {package} {{ module msg {{ struct Foo {{ {members} }}; }}; }};"
-    registry = TypeRegistry.from_folders(write_package(tmp_path / package, {"msg/Foo.idl": text}))
-    message_class = registry[f"{package}/msg/Foo"].message_class
-    for value in EXTREMES[row.family](row):
-        fields = [
-            Field(f"a{number}", each, value if type_parts(each).shape is Shape.SINGLE else (value,) * 3)
-            for number, each in enumerate(field_types)
-        ]
-        defaults = {each.name: proto_field(each).default for each in fields}
-        message = message_class.FromString(message_class(**defaults).SerializeToString())
-        for name, default in defaults.items():
-            found = getattr(message, name)
-            assert (tuple(found) if isinstance(default, tuple) else found) == default
-
-
-@pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
-def test_generated_adapters(row: Scalar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Generated adapters convert to a ROS message and back, and through CDR if the type has a form there."""
-    lines = dict(idl_spellings(replace(row, idl=())))
-    fields = [Field(f"a{number}", field_type) for number, field_type in enumerate(lines)]
-    members = " ".join(
-        line.replace(" a", f" {field.name}") for field, line in zip(fields, lines.values(), strict=True)
-    )
-    generated = generate_foo(f"generated_{row.name.replace(' ', '_')}", members, tmp_path, monkeypatch)
-    generated.FooAdapter.ros_message_type = lambda: ros_message(fields)
-
-    for value in EXTREMES[row.family](row):
-        defaults = {
-            field.name: proto_field(
-                replace(
-                    field, default=value if type_parts(field.type).shape is Shape.SINGLE else (value,) * 3
-                )
-            ).default
-            for field in fields
-        }
-        message = generated.Foo(**defaults)
-
-        converted = generated.FooAdapter.convert_to_ros_message(message)
-
-        assert vars(converted).keys() == {field.name for field in fields}
-        assert generated.FooAdapter.convert_to_custom(converted) == message
-        if row.cdr is not None:
-            assert generated.FooAdapter.from_cdr(generated.FooAdapter.to_cdr(message)) == message
-
-
-def generate_foo(package: str, members: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Generate a message `Foo`, and return its module."""
-    text = f"module {package} {{ module msg {{ struct Foo {{ {members} }}; }}; }};"
-    write_package(folder / package, {"msg/Foo.idl": text})
-    catalog = Catalog((folder_source(folder / package),))
-    generate(Request((package,)), catalog, folder / "out", Options(python_root=f"{package}_root"))
-    monkeypatch.syspath_prepend(folder / "out" / "python")
-    return importlib.import_module(f"{package}_root.{package}.msg")
-
-
-CHARACTERS = "char one; wchar wide; sequence<char, 3> many; sequence<wchar, 3> wides; wchar two[2];"
-
-
-@pytest.fixture
-def characters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    generated = generate_foo("characters", CHARACTERS, tmp_path, monkeypatch)
-    generated.FooAdapter.ros_message_type = SimpleNamespace
-    return generated
-
-
-def test_characters(characters: Any) -> None:
-    """Wide characters are UTF-16 code units, of which text in protobuf has pairs as one character."""
-    message = characters.Foo(
-        one=0x7F, wide=0xD800, many="a\x7f", wides="a\N{GRINNING FACE}", two="\N{GRINNING FACE}"
-    )
-    converted = characters.FooAdapter.convert_to_ros_message(message)
-    assert vars(converted) == {
-        "one": "\x7f",
-        "wide": "\ud800",
-        "many": ["a", "\x7f"],
-        "wides": ["a", "\ud83d", "\ude00"],
-        "two": ["\ud83d", "\ude00"],
+    of_idl, members = named_fields(idl_spellings(row))
+    of_msg, lines = named_fields(msg_spellings(row))
+    definitions = {
+        "msg/Idl.idl": f"module {package} {{ module msg {{ struct Idl {{ {' '.join(members)} }}; }}; }};",
+        "msg/Msg.msg": "\n".join(lines),
     }
-    assert characters.FooAdapter.convert_to_custom(converted) == message
-    cdr = characters.FooAdapter.to_cdr(message)
-    units = b"\3\0\0\0a\0\x3d\xd8\x00\xde\x3d\xd8\x00\xde"
-    assert cdr == b"\0\1\0\0\x7f\0\x00\xd8\2\0\0\0a\x7f\0\0" + units
-    assert characters.FooAdapter.from_cdr(cdr) == message
+    catalog = Catalog((folder_source(write_package(tmp_path / package, definitions)),))
+    generate(Request((package,)), catalog, tmp_path / "out", Options(python_root=f"{package}_root"))
+    monkeypatch.syspath_prepend(tmp_path / "out" / "python")
+    generated = importlib.import_module(f"{package}_root.{package}.msg")
+    registry = TypeRegistry(catalog)
+
+    for name, fields in (("Idl", of_idl), ("Msg", of_msg)):
+        adapters = (getattr(generated, f"{name}Adapter"), adapter_for(f"{package}/msg/{name}", registry))
+        assert len({each.custom_type for each in adapters}) == 1
+        for adapter in adapters:
+            adapter.ros_message_type = partial(ros_message, fields)
+            for value in EXTREMES[row.family](row):
+                check_there_and_back(adapter, row, fields, value)
 
 
-@pytest.mark.parametrize(
-    ("fields", "field"),
-    [
-        ({"one": 0x80}, "one"),
-        ({"one": 200}, "one"),
-        ({"one": 256}, "one"),
-        ({"wide": 0x10000}, "wide"),
-        ({"many": "a\x80"}, "many[1]"),
-        ({"many": "abcd"}, "many"),
-        ({"wides": "ab\N{GRINNING FACE}"}, "wides"),
-        ({"two": "a"}, "two"),
-        ({"two": "a\N{GRINNING FACE}"}, "two"),
-    ],
-)
-def test_protobuf_characters_that_ros_does_not_have(
-    characters: Any, fields: dict[str, Any], field: str
-) -> None:
-    message = characters.Foo(**fields)
-    for convert in (characters.FooAdapter.to_cdr, characters.FooAdapter.convert_to_ros_message):
-        with pytest.raises(ConversionError) as caught:
-            convert(message)
-        assert caught.value.field_path == field
+def named_fields(spellings: Iterator[tuple[FieldType, str]]) -> tuple[list[Field], list[str]]:
+    """Return a field of each type with a name of its own, and the lines that define them."""
+    fields, lines = [], []
+    for number, (field_type, line) in enumerate(spellings):
+        fields.append(Field(f"a{number}", field_type))
+        lines.append(line.replace(" a", f" a{number}"))
+    return fields, lines
 
 
-@pytest.mark.parametrize(
-    ("fields", "field"),
-    [
-        ({"one": "\x80"}, "one"),
-        ({"many": ["a", "\xff"]}, "many[1]"),
-        ({"wides": ["a", "\ud83d", "b"]}, "wides"),
-        ({"wides": ["\N{GRINNING FACE}"]}, "wides[0]"),
-        ({"two": ["\ude00", "\ud83d"]}, "two"),
-    ],
-)
-def test_ros_characters_that_protobuf_does_not_have(
-    characters: Any, fields: dict[str, Any], field: str
-) -> None:
-    values = {"one": "a", "wide": "b", "many": [], "wides": [], "two": ["c", "d"], **fields}
-    with pytest.raises(ConversionError) as caught:
-        characters.FooAdapter.convert_to_custom(SimpleNamespace(**values))
-    assert caught.value.field_path == field
+def check_there_and_back(adapter: Any, row: Scalar, fields: list[Field], value: ScalarValue) -> None:
+    """Put a value into every field, three times where there can be several, and convert there and back."""
+    values = {
+        each.name: proto_field(replace(each, default=value if is_single(each) else (value,) * 3)).default
+        for each in fields
+    }
+    message = adapter.custom_type(**values)
+    for name, expected in values.items():
+        found = getattr(message, name)
+        assert (tuple(found) if isinstance(expected, tuple) else found) == expected
+
+    converted = adapter.convert_to_ros_message(message)
+
+    assert vars(converted).keys() == values.keys()
+    assert adapter.convert_to_custom(converted) == message
+    if row.cdr is None and fields:
+        with pytest.raises(
+            SchemaError, match=f"{row.name} has no one layout in CDR and cannot be transcoded"
+        ):
+            adapter.to_cdr(message)
+    else:
+        assert adapter.from_cdr(adapter.to_cdr(message)) == message
 
 
-@pytest.mark.parametrize(
-    ("cdr", "field"),
-    [
-        (b"\x80\0" + bytes(14), "one"),
-        (bytes(4) + b"\2\0\0\0a\xff" + bytes(10), "many[1]"),
-        (bytes(8) + b"\2\0\0\0\x3d\xd8b\0" + bytes(4), "wides[0]"),
-        (bytes(12) + b"\x00\xde\x3d\xd8", "two[0]"),
-    ],
-)
-def test_cdr_characters_that_protobuf_does_not_have(characters: Any, cdr: bytes, field: str) -> None:
-    with pytest.raises(ConversionError) as caught:
-        characters.FooAdapter.from_cdr(b"\0\1\0\0" + cdr)
-    assert caught.value.field_path == field
-
-
-def test_a_default_value_that_ros_does_not_have() -> None:
-    text = "module pkg { module msg { struct Foo { @default(value='\\xe9') char a; }; }; };"
-    with pytest.raises(DefinitionError, match=r"233 does not fit char: use a whole number from 0 to 127"):
-        parse_idl(text, NAME, "Foo.idl")
+def is_single(field: Field) -> bool:
+    return type_parts(field.type).shape is Shape.SINGLE
 
 
 def ros_message(fields: list[Field]) -> SimpleNamespace:

@@ -31,7 +31,7 @@ wstring wide "ä"
 wstring<=2 short_wide
 byte[] raws [1, 2]
 uint8[<=4] blob
-int16[] shorts
+int16[] shorts [5]
 int16[3] three_shorts [1, 2, 3]
 float32[] singles
 float64[2] two_doubles
@@ -42,6 +42,7 @@ wstring[] wides
 Part part
 Part[] parts
 Part[2] two_parts
+Part[<=1] few_parts
 uint8 DEBUG=10
 # What it is called.
 string NAME="x"
@@ -61,6 +62,8 @@ float32 LIMIT=inf
         }; };
     """,
     "srv/Set.srv": "int8 a 1\nint8 A=3\n---\nbool ok\n",
+    "srv/Header.srv": "int8 a\n---\n",
+    "srv/HeaderAdapter.srv": "Header header\n---\n",
     "action/Go.action": "int32 order\n---\nint32[] sequence\n---\nfloat32 part\n",
 }
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 from google.protobuf.message import Message
 
 from rosidl_adapter_proto.adapter.lazy import (
+    LazyAttributes,
     find_ros_class,
     import_of_ros,
     lazy,
@@ -32,6 +33,19 @@ ResultT = TypeVar("ResultT", bound=Message)
 FeedbackT = TypeVar("FeedbackT", bound=Message)
 
 
+if TYPE_CHECKING:
+
+    class like_constructor:
+        """A class method that, to type checkers, takes what the constructor of the protobuf class takes."""
+
+        def __init__(self, method: Callable[..., Any]) -> None: ...
+
+        def __get__(self, instance: object, adapter: type[TypeAdapter[CustomT, Any]]) -> type[CustomT]: ...
+
+else:
+    like_constructor = classmethod
+
+
 class FieldInfo(NamedTuple):
     """The type of a field, as `type_description_interfaces/msg/FieldType` has it (REP-2011).
 
@@ -50,7 +64,7 @@ class FieldInfo(NamedTuple):
     nested: type[TypeAdapter[Any, Any]] | None = None
 
 
-class TypeAdapter(Generic[CustomT, RosT]):
+class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
     """Converts between a protobuf message and a ROS message (REP-2007, for Python).
 
     Generated classes derive from it; none is ever instantiated.
@@ -142,17 +156,28 @@ class TypeAdapter(Generic[CustomT, RosT]):
         return codec.to_cdr(source)
 
     @classmethod
-    def from_cdr(cls, data: Buffer) -> CustomT:
+    def from_cdr(cls, data: Buffer, fields: Iterable[str] | None = None) -> CustomT:
         """Return the protobuf message of a serialized ROS message: plain CDR of either byte order.
+
+        Args:
+            data: The serialized message.
+            fields: Which fields to read, such as `["header.stamp", "width"]`; the others are skipped and not even
+                looked at. By default all are read.
 
         Raises:
             ConversionError: The bytes are not a valid message of the type; with a codec it is a `TranscodeError`.
             RosNotFoundError: There is no codec, and the ROS message class or rclpy cannot be imported.
+            SchemaError: The type has no such field.
+            TypeError: There is no codec, and only some fields are asked for.
         """
         codec = cls.codec
         if codec is not None:
-            message: CustomT = codec.from_cdr(data)
+            message: CustomT = codec.from_cdr(data) if fields is None else codec.from_cdr(data, fields)
             return message
+        if fields is not None:
+            raise TypeError(
+                f"{name_of(cls)}: conversions that were written by hand take whole messages; leave `fields` out"
+            )
         deserialize, ros_class = (
             import_of_ros("rclpy.serialization", cls).deserialize_message,
             cls.ros_message_type,
@@ -165,7 +190,7 @@ class TypeAdapter(Generic[CustomT, RosT]):
             raise ConversionError(name_of(cls), "", reason) from error
         return cls.convert_to_custom(ros_message)
 
-    @classmethod
+    @like_constructor
     def new(cls, /, **fields: Any) -> CustomT:
         """Make a protobuf message with the default values of the ROS definition, which proto3 cannot carry.
 
@@ -222,8 +247,11 @@ def _individual_description(adapter: type[TypeAdapter[Any, Any]]) -> IndividualT
     }
 
 
-class ServiceAdapter(Generic[RequestT, ResponseT]):
+class ServiceAdapter(LazyAttributes, Generic[RequestT, ResponseT]):
     """The adapters of a service.
+
+    Those that are generated or made at run time also have the protobuf classes as `Request` and `Response`, as the ROS
+    class has its messages, and generated ones go by the name of the service alone as well.
 
     Attributes:
         request: Adapter of the request.
@@ -242,8 +270,11 @@ class ServiceAdapter(Generic[RequestT, ResponseT]):
     ros_class: ClassVar[str]
 
 
-class ActionAdapter(Generic[GoalT, ResultT, FeedbackT]):
+class ActionAdapter(LazyAttributes, Generic[GoalT, ResultT, FeedbackT]):
     """The adapters of an action.
+
+    Those that are generated or made at run time also have the protobuf classes as `Goal`, `Result` and `Feedback`, as
+    the ROS class has its messages, and generated ones go by the name of the action alone as well.
 
     Attributes:
         goal: Adapter of the goal.

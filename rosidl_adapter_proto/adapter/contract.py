@@ -41,6 +41,12 @@ RESERVED_NAMES = frozenset(
 )
 """The attributes of an adapter class, which no constant of a message can be called; nor what begins with `_`."""
 
+
+def constant_name(name: str) -> str:
+    """Return the attribute that a constant of a message is called; an `.idl` may give it a name that is taken."""
+    return f"{name}_" if name in RESERVED_NAMES else name
+
+
 _stated: set[str] = set()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rosidl_adapter_proto.adapter.contract import is_generated
 from rosidl_adapter_proto.errors import Error
@@ -29,29 +29,41 @@ class RosNotFoundError(Error, ImportError):
 
 
 class _Lazy:
-    """An attribute of a class that is made when it is first asked for, and kept for that class alone.
-
-    A class that derives has its own, since its types and conversions can be others.
-    """
+    """An attribute of a class that is made when it is first asked for, and from then on is what was made."""
 
     def __init__(self, make: Callable[[Any], Any]) -> None:
         self.make = make
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self.kept_as = f"{name} of this class"  # no constant of a message can be called so
+        self.name = name
 
     def __get__(self, instance: object, owner: Any) -> Any:
-        try:
-            return owner.__dict__[self.kept_as]
-        except KeyError:
-            made = self.make(owner)
-        setattr(owner, self.kept_as, made)
+        made = self.make(owner)
+        setattr(owner, self.name, made)
         return made
 
 
 def lazy(make: Callable[[Any], Any]) -> Any:
     """Return an attribute of a class that `make` makes of the class; for type checkers it is what is made."""
     return _Lazy(make)
+
+
+class LazyAttributes:
+    """The base of classes with lazy attributes.
+
+    A class that derives from one of them makes its own, since its types and conversions can be others.
+    """
+
+    _lazy_attributes: ClassVar[dict[str, _Lazy]] = {}
+
+    def __init_subclass__(cls, **arguments: Any) -> None:
+        """Take what was made for the classes that this one derives from as not yet made."""
+        super().__init_subclass__(**arguments)
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, _Lazy)}
+        cls._lazy_attributes = {**cls._lazy_attributes, **own}
+        for name, attribute in cls._lazy_attributes.items():
+            if name not in vars(cls):
+                setattr(cls, name, attribute)
 
 
 def find_ros_class(adapter: Any) -> Any:

@@ -5,7 +5,7 @@
 `parse` and `check` run when the package is configured, so that our errors, which name the place, come before those of
 ROS. `generate` runs when it is built. It writes two folders: `package` with what is generated of the package itself,
 which CMake installs, and `dependencies` with the packages that it needs and that do not come with its dependencies:
-those of a ROS that came as binaries. `install` installs these.
+those of a ROS that came as binaries. `install` installs these. What fails is an error here, and a warning of CMake.
 """
 
 from __future__ import annotations
@@ -30,10 +30,12 @@ from rosidl_adapter_proto.generate.targets.index import (
     RESOURCE_FOLDER,
     generated_packages,
     installed_package,
+    is_skipped,
 )
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.closure import closure
 from rosidl_adapter_proto.interfaces.find import Source, interface_source
+from rosidl_adapter_proto.interfaces.model import messages, references
 from rosidl_adapter_proto.schema.numbering import SequentialNumbering
 
 PACKAGE_FOLDER = "package"
@@ -120,7 +122,9 @@ def check(build: Build) -> None:
     Raises:
         Error: Something is wrong with one.
     """
-    check_definitions(Request((build.package,), dependencies=False), build.catalog(), build.options)
+    catalog = build.catalog()
+    _check_dependencies(build, catalog)
+    check_definitions(Request((build.package,), dependencies=False), catalog, build.options)
 
 
 def generate_package(build: Build) -> None:
@@ -130,6 +134,7 @@ def generate_package(build: Build) -> None:
         Error: Something is wrong with a definition, or files cannot be written.
     """
     catalog = build.catalog()
+    _check_dependencies(build, catalog)
     own = Request((build.package,), dependencies=False)
     result = generate(own, catalog, build.output / PACKAGE_FOLDER, build.options)
     for warning in result.warnings:
@@ -140,6 +145,28 @@ def generate_package(build: Build) -> None:
     if missing or read_manifest(folder) is not None:
         generate(Request(missing, dependencies=False), catalog, folder, build.options)
     _write_depfile(build)
+
+
+def _check_dependencies(build: Build, catalog: Catalog) -> None:
+    """Check that no package that the definitions refer to was built without protobuf types.
+
+    They could be made here, but with other field numbers than that package will have once its own are made.
+
+    Raises:
+        Error: There is one, or a definition is not valid.
+    """
+    needed = {
+        name.package
+        for definition in catalog.package(build.package).values()
+        for message in messages(definition.interface, events=build.options.events)
+        for _, name in references(message)
+    }
+    for folder in build.dependencies:
+        if folder.name in needed and is_skipped(folder.parents[1], folder.name):
+            raise GenerateError(
+                f"{build.package} refers to {folder.name}, which was built without protobuf types: "
+                f"a warning says why when {folder.name} is built"
+            )
 
 
 def _provided(build: Build, catalog: Catalog) -> set[str]:
@@ -191,7 +218,7 @@ COMMANDS = {
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m rosidl_adapter_proto.hooks.ament", fromfile_prefix_chars="@"
+        prog="python -m rosidl_adapter_proto.hooks.ament", usage=argparse.SUPPRESS, fromfile_prefix_chars="@"
     )
     parser.add_argument("command", choices=COMMANDS)
     parser.add_argument("--package", required=True)

@@ -18,7 +18,7 @@ from rosidl_adapter_proto.interfaces.model import NAMESPACES, Interface, TypeNam
 from rosidl_adapter_proto.interfaces.msg import parse_action, parse_msg, parse_srv
 
 SUFFIXES = (".idl", ".action", ".srv", ".msg")
-"""File name suffixes of definitions. ROS installs an `.idl` made from each `.msg`: the later one here is taken."""
+"""File name suffixes of definitions."""
 
 _PARSERS: dict[str, Callable[[str, TypeName, str], Interface]] = {
     ".msg": parse_msg,
@@ -27,7 +27,23 @@ _PARSERS: dict[str, Callable[[str, TypeName, str], Interface]] = {
     ".idl": parse_idl,
 }
 
-_IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE")
+_IGNORE_MARKERS = {"COLCON_IGNORE", "AMENT_IGNORE"}
+
+_FOREIGN_MARKERS = ("package.xml", "CMakeCache.txt")
+"""Files of folders in a package that are not part of it: other packages, and what CMake builds in."""
+
+_TEST_FOLDERS = {"test", "tests"}
+"""Folders of a package whose definitions are only built for its tests."""
+
+
+def interface_name(package: str, file: Path) -> TypeName | None:
+    """Return the type that ROS makes of a file of a package, or None if it is no definition.
+
+    The suffix decides, whatever folder the file is in (`convert_to_idl` of rosidl_adapter). An `.idl` file is taken as
+    it is: the folder that it is in decides (the generators of rosidl_cmake).
+    """
+    namespace = file.parent.name if file.suffix == ".idl" else file.suffix.removeprefix(".")
+    return TypeName(package, namespace, file.stem) if namespace in NAMESPACES else None
 
 
 @dataclass(frozen=True)
@@ -39,6 +55,9 @@ class Definition:
         format: How it is written; one of `SUFFIXES`.
         file: Its path, or the place in the embedded store.
         origin: The source that has it, for people.
+        stored_text: The definition itself, if it is in no file.
+        ros1_names: Whether it is written for ROS 1.
+        other_file: Another file that defines the same type, if there is one: then neither can be read.
     """
 
     name: TypeName
@@ -47,14 +66,20 @@ class Definition:
     origin: str
     stored_text: str | None = None
     ros1_names: bool = False
+    other_file: str | None = None
 
     @cached_property
     def text(self) -> str:
         """The definition itself.
 
         Raises:
-            DefinitionError: The file cannot be read, or is not UTF-8.
+            DefinitionError: The file cannot be read, or is not UTF-8, or another one defines the same type.
         """
+        if self.other_file is not None:
+            raise DefinitionError(
+                f"{self.name} is defined by both {self.other_file} and {self.file}: the name of a file makes the name "
+                "of its type, whatever folder it is in; rename or remove one"
+            )
         if self.stored_text is not None:
             return self.stored_text
         try:
@@ -119,8 +144,8 @@ def folder_source(folder: Path) -> Source:
         packages[name], found[name] = package, package_folder
     if not packages:
         raise DefinitionError(
-            f"no interface definitions in {folder}: give the folder of a package, which has .msg, .srv, .action "
-            "or .idl files in folders named msg, srv and action, or a folder of such packages"
+            f"no interface definitions in {folder}: give the folder of a package, which has a package.xml or folders "
+            "named msg, srv and action, or a folder of such packages"
         )
     return Source(str(folder), packages)
 
@@ -131,18 +156,17 @@ def file_source(file: Path) -> tuple[Source, TypeName]:
     Raises:
         DefinitionError: The file is not where a package has its definitions.
     """
-    absolute = file.absolute()
-    namespace = absolute.parent.name
-    if namespace not in NAMESPACES or file.suffix not in (".idl", f".{namespace}"):
+    folder = _package_folder_of(file.absolute())
+    name = _package_name(folder) if folder else ""
+    type_name = interface_name(name, file.absolute())
+    if folder is None or type_name is None:
         raise DefinitionError(
-            f"{file} is not part of a package: a definition is <package>/msg/<Name>.msg, "
-            "<package>/srv/<Name>.srv or <package>/action/<Name>.action, or an .idl file in one of these folders"
+            f"{file} is not part of a package: a definition is a .msg, .srv or .action file below a folder that has a "
+            "package.xml, or below <package>/msg, <package>/srv or <package>/action; an .idl file is in a folder "
+            "named msg, srv or action"
         )
-    folder = absolute.parent.parent
-    name = _package_name(folder)
-    type_name = TypeName(name, namespace, file.stem)
     package = dict(_read_package(folder, name, str(file)))
-    # The file that was named counts, even if the package has the same type in another format.
+    # The file that was named counts, even if the package has the same type in another format or folder.
     package[type_name] = Definition(type_name, file.suffix, str(file), str(file))
     return Source(str(file), {name: package}), type_name
 
@@ -155,21 +179,20 @@ def interface_source(package: str, interfaces: Iterable[str]) -> Source:
         interfaces: Its definitions: paths such as `msg/Track.msg`, which may follow a base folder and a colon.
 
     Raises:
-        DefinitionError: One is not in a folder msg, srv or action, or has another suffix.
+        DefinitionError: One is none that ROS takes.
     """
-    definitions: dict[TypeName, Definition] = {}
+    files: list[tuple[TypeName, str]] = []
     for interface in interfaces:
         base, _, relative = interface.rpartition(":")
-        file = Path(base, relative)
-        namespace = Path(relative).parent.name
-        if namespace not in NAMESPACES or file.suffix not in (".idl", f".{namespace}"):
+        name = interface_name(package, Path(relative))
+        if name is None:
             raise DefinitionError(
-                f"{file} is no definition: it has to be msg/<Name>.msg, srv/<Name>.srv or action/<Name>.action, "
-                "or an .idl file in one of these folders"
+                f"{Path(base, relative)} is no definition: it has to be a .msg, .srv or .action file, or an .idl file "
+                "in a folder named msg, srv or action"
             )
-        name = TypeName(package, namespace, file.stem)
-        definitions[name] = Definition(name, file.suffix, str(file), f"package {package}")
-    return Source(f"package {package}", {package: definitions})
+        files.append((name, str(Path(base, relative))))
+    origin = f"package {package}"
+    return Source(origin, {package: _definitions(dict.fromkeys(files), origin)})
 
 
 def text_source(texts: Mapping[TypeName, str]) -> Source:
@@ -207,7 +230,7 @@ def prefix_sources() -> list[Source]:
         packages = {
             entry.name: package
             for entry in sorted(os.scandir(share), key=lambda each: each.name)
-            if entry.is_dir() and (package := _read_package(Path(entry.path), entry.name, origin))
+            if _is_package(entry) and (package := _read_package(Path(entry.path), entry.name, origin))
         }
         if packages:
             sources.append(Source(origin, packages))
@@ -256,6 +279,11 @@ def _unreadable(path: str | Path, error: OSError) -> DefinitionError:
     return DefinitionError(f"cannot read {path}: {error.strerror}")
 
 
+def _is_package(installed: os.DirEntry[str]) -> bool:
+    """Tell whether a folder in `share` has interfaces; ROS always installs some of their files to these places."""
+    return any(os.path.isdir(os.path.join(installed.path, namespace)) for namespace in NAMESPACES)
+
+
 def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
     """Yield the package folders at and below `folder`; nothing is looked for inside a package.
 
@@ -263,20 +291,43 @@ def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:
         folder: Where to look.
         seen: The real paths that were looked at, since symbolic links may lead back.
     """
-    real_path = os.path.realpath(folder)
-    if real_path in seen or any((folder / marker).exists() for marker in _IGNORE_MARKERS):
+    entries = _entries(folder, seen)
+    if not entries:
         return
-    seen.add(real_path)
-    if (folder / "package.xml").is_file() or any((folder / namespace).is_dir() for namespace in NAMESPACES):
+    if _has_manifest(folder) or any(each.name in NAMESPACES and each.is_dir() for each in entries):
         yield folder
         return
+    for each in entries:
+        if each.is_dir() and not each.name.startswith("."):
+            yield from _package_folders(Path(each.path), seen)
+
+
+def _package_folder_of(file: Path) -> Path | None:
+    """Return the package folder that a file is in: the next one with a package.xml, else that of msg, srv or action."""
+    with_manifest = (each for each in file.parents if _has_manifest(each))
+    with_namespace = (each.parent for each in file.parents if each.name in NAMESPACES)
+    return next(with_manifest, None) or next(with_namespace, None)
+
+
+def _has_manifest(folder: Path) -> bool:
+    return (folder / "package.xml").is_file()
+
+
+def _entries(folder: Path, seen: set[str]) -> list[os.DirEntry[str]]:
+    """Return what is in a folder, in order; nothing if it says so, or was looked at before.
+
+    Raises:
+        DefinitionError: It cannot be read.
+    """
+    real_path = os.path.realpath(folder)
+    if real_path in seen:
+        return []
+    seen.add(real_path)
     try:
-        children = sorted(entry.name for entry in os.scandir(folder) if entry.is_dir())
+        entries = sorted(os.scandir(folder), key=lambda each: each.name)
     except OSError as error:
         raise _unreadable(folder, error) from None
-    for child in children:
-        if not child.startswith("."):
-            yield from _package_folders(folder / child, seen)
+    return [] if any(each.name in _IGNORE_MARKERS for each in entries) else entries
 
 
 def _package_name(folder: Path) -> str:
@@ -295,21 +346,36 @@ def _package_name(folder: Path) -> str:
 
 
 def _read_package(folder: Path, name: str, origin: str) -> Package:
-    found: dict[TypeName, Definition] = {}
-    for namespace in NAMESPACES:
-        try:
-            files = os.listdir(folder / namespace)
-        except (FileNotFoundError, NotADirectoryError):
+    """Return the definitions of a package folder, without each `.idl` that ROS made from another file and installed."""
+    files = [
+        (type_name, file)
+        for file in _files(folder, set())
+        if (type_name := interface_name(name, file)) is not None
+    ]
+    sources = {type_name for type_name, file in files if file.suffix != ".idl"}
+    kept = [
+        (type_name, str(file))
+        for type_name, file in files
+        if type_name not in sources or file.suffix != ".idl"
+    ]
+    return _definitions(kept, origin)
+
+
+def _files(folder: Path, seen: set[str]) -> Iterator[Path]:
+    """Yield what is in a package folder at any depth; other packages and what is for tests are none of it."""
+    for each in _entries(folder, seen):
+        path = Path(each.path)
+        yield path
+        if not each.is_dir() or each.name.startswith(".") or each.name in _TEST_FOLDERS:
             continue
-        except OSError as error:
-            raise _unreadable(folder / namespace, error) from None
-        for suffix in SUFFIXES:
-            if suffix not in (".idl", f".{namespace}"):
-                continue
-            for file in files:
-                stem, extension = os.path.splitext(file)
-                if extension == suffix:
-                    type_name = TypeName(name, namespace, stem)
-                    path = str(folder / namespace / file)
-                    found[type_name] = Definition(type_name, suffix, path, origin)
-    return dict(sorted(found.items()))
+        if not any((path / marker).is_file() for marker in _FOREIGN_MARKERS):
+            yield from _files(path, seen)
+
+
+def _definitions(files: Iterable[tuple[TypeName, str]], origin: str) -> dict[TypeName, Definition]:
+    """Return the definitions that are in files; of a type that two of them define, neither can be read."""
+    found: dict[TypeName, Definition] = {}
+    for name, file in sorted(files):
+        other = found[name].file if name in found else None
+        found[name] = Definition(name, Path(file).suffix, file, origin, other_file=other)
+    return found

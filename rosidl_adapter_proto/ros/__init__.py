@@ -38,7 +38,10 @@ from rosidl_adapter_proto.ros.node import (
     create_service,
     create_subscription,
 )
+from rosidl_adapter_proto.ros.rclpy_internals import accept_protobuf_stamps
+from rosidl_adapter_proto.ros.time import to_rclpy_duration, to_rclpy_time
 from rosidl_adapter_proto.ros.type_hash import TypeHashError
+from rosidl_adapter_proto.time import set_stamp, to_datetime, to_message, to_nanoseconds, to_timedelta
 
 __all__ = (
     "ActionClient",
@@ -59,4 +62,13 @@ __all__ = (
     "create_publisher",
     "create_service",
     "create_subscription",
+    "set_stamp",
+    "to_datetime",
+    "to_message",
+    "to_nanoseconds",
+    "to_rclpy_duration",
+    "to_rclpy_time",
+    "to_timedelta",
 )
+
+accept_protobuf_stamps()

@@ -29,18 +29,26 @@ class RosMessage(Protocol):
 
 
 class RosService(Protocol):
-    """A ROS service, for type checkers: what rosidl generates has these classes, and an adapter does not."""
+    """A ROS service, for type checkers: what rosidl generates has classes of ROS messages, and an adapter does not."""
 
-    Request: Any
-    Response: Any
+    @property
+    def Request(self) -> type[RosMessage]: ...
+
+    @property
+    def Response(self) -> type[RosMessage]: ...
 
 
 class RosAction(Protocol):
-    """A ROS action, for type checkers: what rosidl generates has these classes, and an adapter does not."""
+    """A ROS action, for type checkers: what rosidl generates has classes of ROS messages, and an adapter does not."""
 
-    Goal: Any
-    Result: Any
-    Feedback: Any
+    @property
+    def Goal(self) -> type[RosMessage]: ...
+
+    @property
+    def Result(self) -> type[RosMessage]: ...
+
+    @property
+    def Feedback(self) -> type[RosMessage]: ...
 
 
 class Kind(NamedTuple):

@@ -20,19 +20,25 @@ name, so that a version of rclpy where one is not so fails there first:
 - `goal_handles_execute_through_their_server`: `notify_execute` gets the callback, or None for the registered one.
 - `goals_are_sent_through_send_goal_async`: `ActionClient.send_goal` passes on what it is given.
 - `results_come_through_get_result_async`: all ways to ask for a result end up in `_get_result_async` of the client.
+- `stamps_are_read_by_from_msg`: a class method of `Time` and `Duration`, which takes nothing but ROS's own message.
 """
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import builtin_interfaces.msg  # type: ignore[import-untyped, unused-ignore]
 import rclpy.action.client
+import rclpy.duration
 import rclpy.task
+import rclpy.time
+from google.protobuf.message import Message
 
 from rosidl_adapter_proto.errors import ConversionError
+from rosidl_adapter_proto.time import to_message
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.adapter import ActionAdapter, TypeAdapter
@@ -126,3 +132,27 @@ class ConvertingActionClient(rclpy.action.client.ActionClient):
         if self.adapter is not None:
             convert_result(future, self.adapter.get_result.response)
         return future
+
+
+def accept_protobuf_stamps() -> None:
+    """Make `from_msg` of rclpy's `Time` and `Duration` take protobuf messages too, in the whole process.
+
+    Libraries that read the stamps of messages call it, message_filters above all, and know nothing of us. What it took
+    before, it takes as before; what would be a TypeError otherwise is converted.
+    """
+    classes: tuple[tuple[Any, Any], ...] = (
+        (rclpy.time.Time, builtin_interfaces.msg.Time),
+        (rclpy.duration.Duration, builtin_interfaces.msg.Duration),
+    )
+    for rclpy_class, ros_class in classes:
+        of_rclpy = vars(rclpy_class)["from_msg"].__func__
+        rclpy_class.from_msg = classmethod(_accepting_protobuf(of_rclpy, ros_class))
+
+
+def _accepting_protobuf(of_rclpy: Callable[..., Any], ros_class: Any) -> Callable[..., Any]:
+    @wraps(of_rclpy)
+    def from_msg(cls: Any, msg: Any, *others: Any, **options: Any) -> Any:
+        is_protobuf = isinstance(msg, Message)
+        return of_rclpy(cls, to_message(msg, ros_class) if is_protobuf else msg, *others, **options)
+
+    return from_msg

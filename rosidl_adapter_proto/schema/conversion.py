@@ -14,10 +14,13 @@ from rosidl_adapter_proto.interfaces.model import (
     EMPTY_STRUCT_FIELD,
     Action,
     Interface,
+    Message,
     ScalarValue,
+    SequenceType,
     Service,
     Shape,
     TypeName,
+    references,
 )
 from rosidl_adapter_proto.interfaces.scalars import Family, Scalar
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage
@@ -363,3 +366,34 @@ def ros_class(name: TypeName, interface: Interface) -> str:
 def _ros_part(name: TypeName, service: Service) -> str:
     part = name.name.removeprefix(service.name.name).removeprefix("_")
     return f".{part}" if part else ""
+
+
+NAMED_PARTS = {
+    "request": "Request",
+    "response": "Response",
+    "goal": "Goal",
+    "result": "Result",
+    "feedback": "Feedback",
+}
+"""The parts of services and actions that are messages of the user, and what ROS calls their classes."""
+
+
+def has_defaults(message: Message, find: Callable[[TypeName], Message]) -> bool:
+    """Return whether a message or one that is always in it has a default value.
+
+    A sequence is empty by default, whatever its elements are.
+
+    Args:
+        message: The message.
+        find: Gives each message that is referred to.
+    """
+    seen: set[TypeName] = set()
+    waiting = [message]
+    while waiting:
+        each = waiting.pop()
+        if any(field.default is not None for field in each.fields):
+            return True
+        nested = {name for field, name in references(each) if not isinstance(field.type, SequenceType)}
+        waiting.extend(map(find, nested - seen))
+        seen |= nested
+    return False

@@ -1,6 +1,7 @@
 # What the part of the hook that is in Python is called with.
 
-# Sets _proto_output, _proto_command, _proto_definitions and _proto_arguments, for what rosidl_generate_interfaces() got.
+# Sets _proto_package, _proto_strict, _proto_output, _proto_command, _proto_definitions and _proto_arguments, for what
+# rosidl_generate_interfaces() got.
 macro(_rosidl_generator_proto_arguments output)
   set(_proto_python "${ROSIDL_PROTO_PYTHON}")
   if(NOT _proto_python)
@@ -10,6 +11,8 @@ macro(_rosidl_generator_proto_arguments output)
     find_package(Python3 REQUIRED COMPONENTS Interpreter)
     set(_proto_python "${Python3_EXECUTABLE}")
   endif()
+  set(_proto_package "${PROJECT_NAME}")
+  set(_proto_strict "${ROSIDL_PROTO_STRICT}")
   set(_proto_command "${_proto_python}" -m rosidl_adapter_proto.hooks.ament)
   set(_proto_output "${output}")
   set(_proto_arguments --package "${PROJECT_NAME}" --output "${_proto_output}")
@@ -31,4 +34,11 @@ macro(_rosidl_generator_proto_arguments output)
       list(APPEND _proto_arguments "--${_option}" "${${_variable}}")
     endif()
   endforeach()
+endmacro()
+
+# Writes the arguments to a file, one a line, which is only written anew if it changes.
+macro(_rosidl_generator_proto_write_arguments)
+  list(JOIN _proto_arguments "\n" _proto_text)
+  file(WRITE "${_proto_output}/arguments.new" "${_proto_text}\n")
+  configure_file("${_proto_output}/arguments.new" "${_proto_output}/arguments" COPYONLY)
 endmacro()

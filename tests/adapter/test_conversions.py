@@ -45,6 +45,7 @@ def ros_everything(**fields: Any) -> SimpleNamespace:
         "part": part,
         "parts": [part],
         "two_parts": [part, part],
+        "few_parts": [part],
     }
     return SimpleNamespace(**{**values, **fields})
 
@@ -95,6 +96,7 @@ def bad_part(**header: Any) -> SimpleNamespace:
             "parts[1].header.stamp.sec: Value out of range: 2147483648",
         ),
         ({"two_parts": []}, "two_parts: 0 elements, but the array has 2"),
+        ({"few_parts": [None, None]}, "few_parts: 2 elements, more than the bound of 1"),
     ],
 )
 def test_bad_ros_values(things: SimpleNamespace, fields: dict[str, Any], text: str) -> None:
@@ -117,7 +119,10 @@ class FakeEverything:
 
     def __init__(self, **fields: Any) -> None:
         values = ros_everything(
-            blob=array.array("B"), shorts=array.array("h"), singles=array.array("f"), few=array.array("I")
+            blob=array.array("B"),
+            shorts=array.array("h", [5]),
+            singles=array.array("f"),
+            few=array.array("I"),
         )
         vars(self).update({**vars(values), **fields})
         self.part = FakePart()
@@ -164,6 +169,7 @@ def test_round_trip_with_any_class(things: SimpleNamespace, fake_ros: Any) -> No
             "wides[1]: 'utf-16-le' codec can't decode byte 0x78 in position 0: truncated data",
         ),
         ({"two_parts": [{}]}, "two_parts: 1 element, but the array has 2 (or none, for zeros)"),
+        ({"few_parts": [{}, {}]}, "few_parts: 2 elements, more than the bound of 1"),
     ],
 )
 def test_bad_protobuf_values(

@@ -47,6 +47,17 @@ def test_list_a_package(folder: Path, run: Run) -> None:
     )
 
 
+def test_list_a_package_with_folders(folder: Path, run: Run) -> None:
+    definitions = {"msg/shapes/A.msg": "", "api/srv/B.srv": "---", "msg/C.msg": "", "msg/old/C.msg": ""}
+    write_package(folder / "src" / "my", definitions, "my_msgs")
+
+    assert run("list", "my_msgs", "-I", "src").out == (
+        "my_msgs/msg/A  .msg  src/my/msg/shapes/A.msg\n"
+        "my_msgs/msg/C  .msg  src/my/msg/C.msg and src/my/msg/old/C.msg\n"
+        "my_msgs/srv/B  .srv  src/my/api/srv/B.srv\n"
+    )
+
+
 def test_list_tells_of_the_ros_installation(folder: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     write_package(folder / "opt" / "share" / "std_msgs", {"msg/A.msg": ""})
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(folder / "opt"))

@@ -39,6 +39,33 @@ def test_first_and_second_run(my_msgs: Path, folder: Path, run: Run) -> None:
     assert again.out == "generated: 1 interface, files: 0 written, 0 removed, 8 unchanged\n"
 
 
+@pytest.mark.parametrize(
+    "what", ["./src", "src/my_msgs/", "src/my_msgs/msg/shapes/A.msg", "my_msgs/msg/A", "my_msgs"]
+)
+def test_definitions_in_folders(what: str, folder: Path, run: Run) -> None:
+    """As Autoware has them: the folders below `msg` are for people."""
+    write_package(folder / "src" / "my_msgs", {"msg/shapes/A.msg": "B b\n", "msg/points/B.msg": "bool b\n"})
+
+    ended = run("generate", what, "--include", "src")
+
+    assert (ended.code, ended.err) == (0, "")
+    assert (folder / "generated/proto/my_msgs/msg/A.proto").is_file()
+    assert (folder / "generated/python/rosidl_proto/my_msgs/msg/B_adapter.py").is_file()
+
+
+def test_two_definitions_of_one_name(folder: Path, run: Run) -> None:
+    write_package(folder / "src" / "my_msgs", {"msg/a/A.msg": "", "msg/b/A.msg": ""})
+
+    ended = run("generate", "./src")
+
+    assert (ended.code, ended.out) == (3, "")
+    assert ended.err == (
+        "Error: my_msgs/msg/A is defined by both src/my_msgs/msg/a/A.msg and src/my_msgs/msg/b/A.msg: the name of a "
+        "file makes the name of its type, whatever folder it is in; rename or remove one\n"
+    )
+    assert not (folder / "generated").exists()
+
+
 def test_verbose(my_msgs: Path, run: Run) -> None:
     ended = run("generate", "./src", "-v", "--output", "out", "--numbering", "sequential")
 

@@ -27,6 +27,7 @@ def test_hook_install(folder: Path, run: Run) -> None:
         "share/rosidl_generator_proto/cmake/rosidl_generator_proto_arguments.cmake",
         "share/rosidl_generator_proto/cmake/rosidl_generator_proto_generate_interfaces.cmake",
         "share/rosidl_generator_proto/cmake/rosidl_generator_proto_python.cmake",
+        "share/rosidl_generator_proto/cmake/rosidl_generator_proto_run.cmake",
     ]
     python = (prefix / CONFIG).with_name("rosidl_generator_proto_python.cmake")
     assert python.read_text() == f'set(_rosidl_generator_proto_python "{sys.executable}")\n'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from rosidl_adapter_proto.errors import GenerateError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import store_source
+from tests.generate.conftest import Generated
 
 
 def test_constants(things: SimpleNamespace) -> None:
@@ -54,6 +56,16 @@ def test_names_that_collide(things: SimpleNamespace) -> None:
     assert things.msg.HeaderAdapter.fields[0].nested.type_name == "std_msgs/msg/Header"
 
 
+def test_services_named_like_adapters(things: SimpleNamespace) -> None:
+    """A service may be called like the adapter of another one, and like that of a message in it."""
+    srv = things.srv
+    assert srv.HeaderAdapter_ is srv.Header
+    assert srv.HeaderAdapterAdapter is srv.HeaderAdapter
+    assert srv.Header.type_name == "things/srv/Header"
+    assert srv.HeaderAdapter.type_name == "things/srv/HeaderAdapter"
+    assert srv.HeaderAdapter.request.fields[0].nested is things.msg.HeaderAdapter
+
+
 def test_groups(things: SimpleNamespace) -> None:
     assert things.srv.SetAdapter.request is things.srv.Set_RequestAdapter
     assert things.srv.SetAdapter.response.custom_type is things.srv.Set_Response
@@ -68,8 +80,33 @@ def test_groups(things: SimpleNamespace) -> None:
     assert go.feedback_message.custom_type is things.action.Go_FeedbackMessage
 
 
+def test_services_and_actions_have_the_names_of_ros(things: SimpleNamespace) -> None:
+    srv, action = things.srv, things.action
+    assert srv.Set is srv.SetAdapter
+    assert (srv.Set.Request, srv.Set.Response) == (srv.Set_Request, srv.Set_Response)
+    assert action.Go is action.GoAdapter
+    go = action.Go
+    assert (go.Goal, go.Result, go.Feedback) == (action.Go_Goal, action.Go_Result, action.Go_Feedback)
+    assert action.Go_SendGoal.Request is action.Go_SendGoal_Request
+    assert action.Go_GetResult.Response is action.Go_GetResult_Response
+
+
+def test_every_service_and_action_has_the_names_of_ros(ros_install: Generated) -> None:
+    groups = [name for name in ros_install.interfaces if name.namespace != "msg"]
+    assert groups
+    for name in groups:
+        package = importlib.import_module(f"rosidl_proto.{name.package}.{name.namespace}")
+        parts = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}[name.namespace]
+        group = getattr(package, name.name)
+        assert group is ros_install.adapter(name)
+        for part in parts:
+            assert getattr(group, part) is getattr(package, f"{name.name}_{part}")
+            assert getattr(group, part) is getattr(group, part.lower()).custom_type
+
+
 def test_package_exports(things: SimpleNamespace) -> None:
-    assert set(things.srv.__all__) == {
+    assert {name for name in things.srv.__all__ if name.startswith("Set")} == {
+        "Set",
         "SetAdapter",
         "Set_Request",
         "Set_RequestAdapter",

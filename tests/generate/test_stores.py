@@ -1,5 +1,7 @@
 """Every message of every distribution in the embedded store generates, compiles, imports and converts.
 
+So do adapters that are made of them at run time, and these are like the generated ones.
+
 Distributions define the same protobuf files in different ways, so each needs a process of its own.
 """
 
@@ -20,6 +22,10 @@ from rosidl_adapter_proto.interfaces.find import store_source
 PROGRAM = """
 import dataclasses, importlib, sys
 from rosbags.typesys import Stores, get_typestore
+from rosidl_adapter_proto import TypeRegistry, adapter_for
+from rosidl_adapter_proto.interfaces.catalog import Catalog
+from rosidl_adapter_proto.interfaces.find import store_source
+from tests.run_time import check_attributes
 
 distribution, names = sys.argv[1], sys.argv[2:]
 generation = "ros1" if distribution == "noetic" else "ros2"
@@ -65,17 +71,21 @@ def check(ros, custom, path):
         else:
             assert expected == found, f"{path}.{name}"
 
+registry = TypeRegistry(Catalog((store_source(distribution),)))
 for name in types.fielddefs:
     package, namespace, short = name.split("/")
     module = importlib.import_module(f"rosidl_proto.{package}.{namespace}")
-    adapter = getattr(module, f"{short}Adapter")
+    generated = getattr(module, f"{short}Adapter")
+    at_run_time = adapter_for(name, registry)
+    check_attributes(at_run_time, generated)
     made = message(name)
-    custom = adapter.convert_to_custom(made)
-    assert adapter.custom_type.FromString(custom.SerializeToString()) == custom
-    check(made, custom, name)
-    data = bytes(types.serialize_cdr(made, name))
-    assert adapter.from_cdr(data) == custom, name
-    check(types.deserialize_cdr(adapter.to_cdr(custom), name), custom, name)
+    for adapter in (generated, at_run_time):
+        custom = adapter.convert_to_custom(made)
+        assert adapter.custom_type.FromString(custom.SerializeToString()) == custom
+        check(made, custom, name)
+        data = bytes(types.serialize_cdr(made, name))
+        assert adapter.from_cdr(data) == custom, name
+        check(types.deserialize_cdr(adapter.to_cdr(custom), name), custom, name)
 print(len(types.fielddefs))
 """
 

@@ -14,8 +14,8 @@ from tests.generate.conftest import Generated
 # Lines that end in a comment must give that error, or that type; all others none.
 USES = """\
 from rosidl_proto.sensor_msgs.msg import Imu, ImuAdapter
-from rosidl_proto.std_srvs.srv import SetBool_Request, SetBoolAdapter
-from rosidl_proto.test_msgs.action import FibonacciAdapter
+from rosidl_proto.std_srvs.srv import SetBool, SetBool_Request, SetBoolAdapter, Trigger
+from rosidl_proto.test_msgs.action import Fibonacci, FibonacciAdapter
 
 message = Imu(linear_acceleration_covariance=[1.0] * 9)
 reveal_type(message.header.stamp.sec)  # type: int
@@ -25,6 +25,19 @@ reveal_type(ImuAdapter.new())  # type: Imu
 reveal_type(SetBoolAdapter.request.new(data=True))  # type: SetBool_Request
 reveal_type(SetBoolAdapter.request.custom_type())  # type: SetBool_Request
 reveal_type(FibonacciAdapter.goal.convert_to_custom(object()))  # type: Fibonacci_Goal
+reveal_type(SetBool.Request())  # type: SetBool_Request
+reveal_type(SetBool.response.new())  # type: SetBool_Response
+reveal_type(Fibonacci.Goal())  # type: Fibonacci_Goal
+request: SetBool.Request = SetBool_Request()
+feedback: Fibonacci.Feedback = FibonacciAdapter.feedback.new(sequence=[1])
+ImuAdapter.new(linear_acceleration_covariance=[1.0] * 9)
+ImuAdapter.new(fram_id="imu")  # error
+ImuAdapter.new(orientation_covariance="text")  # error
+ImuAdapter.new(message)  # error
+SetBool.request.new(dat=True)  # error
+SetBool.Request(dat=True)  # error
+request = Trigger.Request()  # error
+feedback = Fibonacci.Result()  # error
 message.header.frame_id = 3  # error
 message.header = message.header  # error
 Imu(nonsense=1)  # error

@@ -118,6 +118,23 @@ def test_what_happens_to_be_installed(build: Path, folder: Path, monkeypatch: py
     assert made_again(build) == {"std_msgs"}
 
 
+@pytest.mark.parametrize("command", ["check", "generate"])
+def test_a_dependency_that_was_skipped(
+    command: str, build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its fields would be numbered here, and not as its own build will number them."""
+    resource(folder / "ros", "std_msgs").write_bytes(b"")
+
+    assert run(command, build) == 1
+    assert capsys.readouterr().err == (
+        "track_msgs refers to std_msgs, which was built without protobuf types: a warning says why when std_msgs is "
+        "built\n"
+    )
+
+    (folder / "src/track_msgs/msg/Track.msg").write_text("uint32 id\n")
+    assert run(command, build) == 0
+
+
 def test_install(build: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run("generate", build)
     with build.open("a") as arguments:
@@ -207,7 +224,7 @@ def test_what_is_wrong(
     assert printed.err == error.format(file=file, folder=folder)
 
 
-@pytest.mark.parametrize("path", ["types/Track.msg", "msg/Track.txt", "srv/Track.msg"])
+@pytest.mark.parametrize("path", ["msg/Track.txt", "types/Track.idl", "msg/deep/Track.idl"])
 def test_what_is_no_definition(
     path: str, build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,8 +232,8 @@ def test_what_is_no_definition(
 
     assert run("parse", build) == 1
     assert capsys.readouterr().err == (
-        f"{folder}/src/track_msgs/{path} is no definition: it has to be msg/<Name>.msg, srv/<Name>.srv or "
-        "action/<Name>.action, or an .idl file in one of these folders\n"
+        f"{folder}/src/track_msgs/{path} is no definition: it has to be a .msg, .srv or .action file, or an .idl "
+        "file in a folder named msg, srv or action\n"
     )
 
 

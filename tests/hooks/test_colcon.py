@@ -9,13 +9,14 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
+from tests.folders import write_package
 from tests.programs import run
 from tests.ros.support import reserve_domain
 
@@ -118,7 +119,7 @@ class Workspace:
             and any(part in str(path) for part in parts)
             and "CMakeFiles" not in path.parts
             and path.suffix in (".py", ".pyi", ".proto", ".c", ".h", ".hpp", ".cpp", ".so", "")
-            and path.name not in ("Makefile", "parse_arguments", "check_arguments", "depfile")
+            and path.name not in ("Makefile", "arguments", "depfile")
         }
 
 
@@ -295,10 +296,13 @@ def test_a_python_that_cannot_be_run(workspace: Workspace) -> None:
     shutil.rmtree(workspace.file("scene_msgs"))
     shutil.rmtree(workspace.file("track_node"))
 
-    output = workspace.build("--cmake-args", "-DROSIDL_PROTO_PYTHON=/nowhere/python3", succeeds=False)
+    output = workspace.build(
+        *("--cmake-args", "-DROSIDL_PROTO_PYTHON=/nowhere/python3", "-DROSIDL_PROTO_STRICT=ON"),
+        succeeds=False,
+    )
 
-    assert "rosidl_generator_proto: /nowhere/python3 cannot be run (" in output
-    assert "set ROSIDL_PROTO_PYTHON to a Python that has" in " ".join(output.split())
+    assert "/nowhere/python3 cannot be run (" in output
+    assert "set ROSIDL_PROTO_PYTHON to a Python that has" in output
 
 
 @pytest.mark.parametrize(
@@ -332,8 +336,88 @@ def test_a_wrong_definition(path: str, wrong: str, place: str, reason: str, work
     with file.open("a", encoding="utf-8") as definition:
         definition.write(wrong)
 
-    output = workspace.build(succeeds=False)
+    output = workspace.build("--cmake-args", "-DROSIDL_PROTO_STRICT=ON", succeeds=False)
 
     assert any(f"{file}:{place}" in line and reason in line for line in output.splitlines()), output
     assert "no protobuf types can be made of track_msgs" in output
     assert "Traceback" not in output
+
+
+def add_package(
+    workspace: Workspace, name: str, definitions: Mapping[str, str], depends: str, settings: str = ""
+) -> None:
+    """Add an interface package, made after track_msgs."""
+    template = ROOT / "examples/workspace/src/track_msgs"
+    manifest = (template / "package.xml").read_text(encoding="utf-8").replace("track_msgs", name)
+    tags = "".join(f"<depend>{each}</depend>" for each in depends.split())
+    cmake = (template / "CMakeLists.txt").read_text(encoding="utf-8").replace("track_msgs", name)
+    found = "".join(f"find_package({each} REQUIRED)\n" for each in depends.split())
+    files = {
+        **definitions,
+        "package.xml": manifest.replace("<depend>std_msgs</depend>", tags),
+        "CMakeLists.txt": cmake.replace("find_package(std_msgs REQUIRED)\n", found + settings)
+        .replace(
+            "  msg/Track.msg\n  srv/FindTrack.srv\n  action/Follow.action\n",
+            "  " + "\n  ".join(definitions) + "\n",
+        )
+        .replace("DEPENDENCIES std_msgs", f"DEPENDENCIES {depends}"),
+    }
+    write_package(workspace.file(name), files)
+
+
+USE_OBJECTS = """
+from object_msgs.msg import DetectedObject as Native
+from rclpy.serialization import deserialize_message
+from rosidl_proto.object_msgs.msg import DetectedObject, DetectedObjectAdapter as Adapter, Shape
+native = deserialize_message(Adapter.to_cdr(DetectedObject(shape=Shape(radius=2.5))), Native)
+print(native.shape.radius)
+"""
+
+
+def test_folders_and_what_cannot_be_served(workspace: Workspace) -> None:
+    """A workspace as Autoware has it, with folders below `msg`; ROS builds all of it, also what we do not serve."""
+    for name in ("scene_msgs", "track_msgs", "track_node"):
+        shutil.rmtree(workspace.file(name))
+    add_package(
+        workspace,
+        "object_msgs",
+        {
+            "msg/object_recognition/DetectedObject.msg": "std_msgs/Header header\nShape shape\n",
+            "msg/object_recognition/shapes/Shape.msg": "float64 radius\n",
+            "object_api/srv/FindObject.srv": "---\nDetectedObject[] objects\n",
+        },
+        "std_msgs",
+    )
+    sequential = "set(ROSIDL_PROTO_NUMBERING sequential)\n"
+    add_package(workspace, "refused_msgs", {"msg/Part.msg": "int8 part\n"}, "std_msgs", sequential)
+    lock_file = workspace.file("refused_msgs/rosidl-proto.lock")
+    lock_file.write_text("<<<<<<< HEAD\n", encoding="utf-8")
+    whole = {"msg/Whole.msg": "refused_msgs/Part[] parts\nobject_msgs/Shape shape\n"}
+    add_package(workspace, "dependent_msgs", whole, "refused_msgs object_msgs")
+
+    output = workspace.build("--symlink-install")
+
+    assert "rosidl_generator_proto: object_msgs gets protobuf types and adapters" in output
+    python = f"python -c '{USE_OBJECTS}'"
+    assert workspace.run(python) == "2.5\n"
+    warning = "rosidl_generator_proto: no protobuf types can be made of"
+    assert re.search(rf"{warning} refused_msgs\.\s+{lock_file} is damaged: ", output)
+    assert re.search(
+        rf"{warning} dependent_msgs\.\s+dependent_msgs refers to refused_msgs, which was built without protobuf types: "
+        "a warning says why when refused_msgs is built",
+        output,
+    )
+    native = "python -c 'import dependent_msgs.msg as msg; print(msg.Whole(parts=[]))'"
+    assert workspace.run(native).startswith("dependent_msgs.msg.Whole(parts=[], ")
+    listed = dict(line.split(maxsplit=1) for line in workspace.run("rosidl-proto list").splitlines())
+    assert "adapters in" in listed["object_msgs"]
+    assert "adapters in" not in listed["refused_msgs"] + listed["dependent_msgs"]
+    assert (
+        workspace.run("rosidl-proto list object_msgs")
+        .splitlines()[0]
+        .endswith("share/object_msgs/object_recognition/DetectedObject.msg")
+    )
+
+    lock_file.unlink()
+    assert warning not in workspace.build("--symlink-install")
+    workspace.run("python -c 'from rosidl_proto.dependent_msgs.msg import Whole; Whole().parts.add(part=1)'")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rosidl_adapter_proto.errors import Error
 from tests.folders import write_package
 from tests.programs import run
 
@@ -46,3 +47,27 @@ def test_rosidl_generate(tmp_path: Path) -> None:
     assert (
         "my_msgs/msg/Point was not found, but my_msgs/msg/Place.position (my_msgs/msg/Place.msg:1:7)" in error
     )
+
+
+@pytest.mark.skipif(not ROSIDL.exists(), reason="needs rosidl_cli: pip install '.[ros]'")
+def test_among_other_types(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`rosidl generate` runs one type after the other: those behind this one have to get their turn."""
+    from rosidl_adapter_proto.hooks.rosidl_cli import GenerateProto
+
+    interfaces = [f"{write_package(folder / 'my_msgs', {'msg/deep/A.msg': 'B b'})}:msg/deep/A.msg"]
+    reason = "my_msgs/msg/B was not found, but my_msgs/msg/A.b"
+
+    assert GenerateProto("proto").generate("my_msgs", interfaces, [], folder / "out/proto") == []
+    warning = capsys.readouterr().err
+    assert warning.startswith(f"Warning: no protobuf types can be made of my_msgs: {reason} ")
+
+    with pytest.raises(Error, match=f"^{reason} "):
+        GenerateProto("proto", strict=True).generate("my_msgs", interfaces, [], folder / "out/proto")
+    with pytest.raises(Error, match=f"^{reason} "):
+        GenerateProto("proto").generate("my_msgs", interfaces, [], folder / "out")
+
+    command = ("-t", "proto[strict: true]", "-o", "proto", "my_msgs", *interfaces)
+    assert reason in run(ROSIDL, "generate", *command, folder=folder, code=1)
+    (folder / "my_msgs/msg/deep/A.msg").write_text("int8 b\n")
+    run(ROSIDL, "generate", *command, folder=folder)
+    assert (folder / "proto/proto/my_msgs/msg/A.proto").is_file()

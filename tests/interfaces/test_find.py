@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +15,7 @@ from rosidl_adapter_proto.interfaces.find import (
     file_source,
     folder_source,
     installed_sources,
+    interface_source,
     prefix_sources,
     store_source,
     text_source,
@@ -77,11 +79,48 @@ def error_of(function: object, *arguments: object, **options: object) -> str:
             ["a/action/C", "a/msg/A", "a/srv/B"],
         ),
         ({"a/msg/A.idl": message_idl("a/msg/A", "long x;")}, ["a/msg/A"]),
-        # What is not a definition, or stands in the wrong folder
-        ({"a/msg/A.msg": "", "a/msg/B.srv": "", "a/srv/C.msg": "", "a/D.msg": ""}, ["a/msg/A"]),
-        ({"a/msg/A.msg": "", "a/msg/A.json": "", "a/msg/B.msg~": "", "a/msg/sub/C.msg": ""}, ["a/msg/A"]),
-        # Nothing is looked for inside a package, in hidden folders, or where colcon does not look either
-        ({"a/msg/A.msg": "", "a/test/b/msg/B.msg": ""}, ["a/msg/A"]),
+        # The suffix decides and not the folder, wherever in a package a file is; of an .idl, its folder
+        (
+            {
+                "a/msg/A.msg": "",
+                "a/msg/B.srv": SERVICE,
+                "a/srv/C.msg": "",
+                "a/D.msg": "",
+                "a/srv/E.action": ACTION,
+            },
+            ["a/action/E", "a/msg/A", "a/msg/C", "a/msg/D", "a/srv/B"],
+        ),
+        (
+            {"a/msg/sub/A.msg": "", "a/msg/sub/deep/B.msg": "", "a/srv/s/C.srv": ""},
+            ["a/msg/A", "a/msg/B", "a/srv/C"],
+        ),
+        (
+            {
+                "x/package.xml": "<package><name>a</name></package>",
+                "x/types/A.msg": "",
+                "x/api/srv/B.srv": SERVICE,
+            },
+            ["a/msg/A", "a/srv/B"],
+        ),
+        (
+            {"a/msg/A.idl": "", "a/msg/sub/B.idl": "", "a/D.idl": "", "a/api/srv/C.idl": ""},
+            ["a/msg/A", "a/srv/C"],
+        ),
+        # What is not a definition
+        (
+            {"a/msg/A.msg": "", "a/msg/A.json": "", "a/msg/B.msg~": "", "a/msg/msg": "", "a/msg/.msg": ""},
+            ["a/msg/A"],
+        ),
+        # A package does not have another one, hidden folders, what is for its tests, and what was built
+        ({"a/msg/A.msg": "", "a/b/msg/B.msg": "", "a/b/package.xml": "<package/>"}, ["a/msg/A"]),
+        (
+            {"a/msg/A.msg": "", "a/test/b/msg/B.msg": "", "a/tests/B.msg": "", "a/msg/.b/B.msg": ""},
+            ["a/msg/A"],
+        ),
+        ({"a/msg/A.msg": "", "a/build/msg/B.msg": "", "a/build/CMakeCache.txt": ""}, ["a/msg/A"]),
+        ({"a/msg/A.msg": "", "a/CMakeCache.txt": ""}, ["a/msg/A"]),
+        ({"a/msg/A.msg": "", "a/msg/old/B.msg": "", "a/msg/old/COLCON_IGNORE": ""}, ["a/msg/A"]),
+        # Packages are not looked for in hidden folders, or where colcon does not look either
         ({"a/msg/A.msg": "", ".b/msg/B.msg": ""}, ["a/msg/A"]),
         ({"a/msg/A.msg": "", "b/msg/B.msg": "", "b/COLCON_IGNORE": ""}, ["a/msg/A"]),
         ({"a/msg/A.msg": "", "b/c/msg/B.msg": "", "b/AMENT_IGNORE": ""}, ["a/msg/A"]),
@@ -144,8 +183,8 @@ def test_a_byte_order_mark_is_no_part_of_the_definition(suffix: str, tmp_path: P
     [
         (
             {},
-            "no interface definitions in {}: give the folder of a package, which has .msg, .srv, .action or .idl "
-            "files in folders named msg, srv and action, or a folder of such packages",
+            "no interface definitions in {}: give the folder of a package, which has a package.xml or folders "
+            "named msg, srv and action, or a folder of such packages",
         ),
         (
             {"x/a/msg/A.msg": "", "y/a/msg/B.msg": ""},
@@ -164,6 +203,82 @@ def test_a_byte_order_mark_is_no_part_of_the_definition(suffix: str, tmp_path: P
 )
 def test_errors_of_folders(files: dict[str, str], error: str, tmp_path: Path) -> None:
     assert error_of(folder_source, write(tmp_path, files)) == error.replace("{}", str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("a/msg/A.msg", "a/msg/deep/A.msg"),
+        ("a/msg/b/A.msg", "a/msg/c/A.msg"),
+        ("a/api/msg/A.idl", "a/msg/A.idl"),
+    ],
+)
+def test_two_files_of_one_name(one: str, other: str, tmp_path: Path) -> None:
+    """Whoever needs neither is not bothered."""
+    catalog = read(tmp_path, {one: "", other: "", "a/msg/Other.msg": ""})
+    assert catalog.message(name("a/msg/Other")).name == name("a/msg/Other")
+    error = (
+        f"a/msg/A is defined by both {tmp_path}/{one} and {tmp_path}/{other}: the name of a file makes the name of its "
+        "type, whatever folder it is in; rename or remove one"
+    )
+    assert error_of(lambda: catalog.definition(name("a/msg/A")).text) == error
+    assert error_of(closure, catalog, ["a"]) == error
+    # A file that is named counts.
+    source, type_name = file_source(tmp_path / other)
+    assert source.packages["a"][type_name].file == f"{tmp_path}/{other}"
+    assert source.packages["a"][type_name].text == ""
+
+
+@pytest.mark.parametrize(
+    "interface", [f"{{}}:{path}" for path in ("msg/A.msg", "msg/sub/A.msg", "types/A.msg", "A.msg")]
+)
+def test_a_listed_definition(interface: str, tmp_path: Path) -> None:
+    """`base:path` as rosidl_generate_interfaces() takes it."""
+    text = interface.format(tmp_path)
+    (definition,) = interface_source("a", [text, text]).packages["a"].values()
+    assert (definition.name, definition.file) == (name("a/msg/A"), text.replace(":", "/"))
+
+
+def test_listed_definitions_as_rosidl_adapter_takes_them(tmp_path: Path) -> None:
+    """What it writes, `msg/A.idl`, tells which type it makes of a file."""
+    main = pytest.importorskip("rosidl_adapter.main", reason="needs rosidl_adapter, from the ROS wheels").main
+    files = {
+        **dict.fromkeys(("msg/A.msg", "msg/deep/er/B.msg", "srv/C.msg", "D.msg", "types/E.msg"), "int8 x"),
+        **{
+            "msg/F.srv": SERVICE,
+            "types/srv/G.srv": SERVICE,
+            "msg/H.action": ACTION,
+            "action/deep/I.action": ACTION,
+        },
+    }
+    write(tmp_path / "src", files)
+    interfaces = [f"{tmp_path}/src:{path}" for path in files]
+    write(tmp_path, {"arguments": json.dumps({"non_idl_tuples": interfaces})})
+    main(
+        [
+            *("--package-name", "a", "--arguments-file", f"{tmp_path}/arguments"),
+            *("--output-dir", f"{tmp_path}/out", "--output-file", f"{tmp_path}/list/idl"),
+        ]
+    )
+    written = [line.rpartition(":")[2] for line in (tmp_path / "list/idl").read_text().splitlines()]
+    ours = interface_source("a", interfaces).packages["a"]
+    assert sorted(written) == sorted(f"{each.namespace}/{each.name}.idl" for each in ours)
+    assert ours.keys() == folder_source(write(tmp_path / "a", files)).packages["a"].keys()
+
+
+def test_two_listed_definitions_of_one_name() -> None:
+    definitions = interface_source("a", ["/b:msg/A.msg", "/c:msg/A.idl"]).packages["a"]
+    assert error_of(lambda: definitions[name("a/msg/A")].text).startswith(
+        "a/msg/A is defined by both /b/msg/A.msg and /c/msg/A.idl: "
+    )
+
+
+@pytest.mark.parametrize("path", ["msg/A.txt", "msg/A", "types/A.idl", "msg/sub/A.idl", "A.idl"])
+def test_what_is_no_definition_and_listed(path: str) -> None:
+    assert error_of(interface_source, "a", [f"/b:{path}"]) == (
+        f"/b/{path} is no definition: it has to be a .msg, .srv or .action file, or an .idl file in a folder named "
+        "msg, srv or action"
+    )
 
 
 def test_a_folder_that_is_none(tmp_path: Path) -> None:
@@ -222,18 +337,38 @@ def test_a_file_wins_over_its_other_format(tmp_path: Path) -> None:
 
 
 def test_a_file_of_a_package_with_a_manifest(tmp_path: Path) -> None:
-    write(tmp_path, {"x/msg/A.msg": "", "x/package.xml": "<package><name>a</name></package>"})
-    assert file_source(tmp_path / "x/msg/A.msg")[1] == name("a/msg/A")
+    files = {"x/msg/A.msg": "", "x/api/msg/B.msg": "", "x/C.msg": "", "x/test/D.msg": ""}
+    write(tmp_path, {**files, "x/package.xml": "<package><name>a</name></package>"})
+    for path in files:
+        source, type_name = file_source(tmp_path / path)
+        assert type_name == name(f"a/msg/{Path(path).stem}")
+        assert set(source.packages["a"]) == {*map(name, ("a/msg/A", "a/msg/B", "a/msg/C")), type_name}
 
 
 @pytest.mark.parametrize(
-    "path", ["A.msg", "a/A.msg", "a/msg/A.txt", "a/msg/A", "a/msg/A.srv", "a/srv/A.msg", "a/msg/deep/A.msg"]
+    ("path", "expected"),
+    [
+        ("a/msg/B.srv", "a/srv/B"),
+        ("a/srv/B.msg", "a/msg/B"),
+        ("a/msg/deep/B.msg", "a/msg/B"),
+        ("a/msg/b/srv/B.srv", "b/srv/B"),
+        ("a/msg/b/srv/B.idl", "b/srv/B"),
+    ],
+)
+def test_files_of_a_package_without_a_manifest(path: str, expected: str, tmp_path: Path) -> None:
+    """It has the name of the folder that has the next folder named msg, srv or action."""
+    assert file_source(write(tmp_path, {path: ""}) / path)[1] == name(expected)
+
+
+@pytest.mark.parametrize(
+    "path", ["A.msg", "a/A.msg", "a/msg/A.txt", "a/msg/A", "a/A.idl", "a/msg/deep/A.idl"]
 )
 def test_files_outside_a_package(path: str, tmp_path: Path) -> None:
     write(tmp_path, {path: ""})
     assert error_of(file_source, tmp_path / path) == (
-        f"{tmp_path}/{path} is not part of a package: a definition is <package>/msg/<Name>.msg, "
-        "<package>/srv/<Name>.srv or <package>/action/<Name>.action, or an .idl file in one of these folders"
+        f"{tmp_path}/{path} is not part of a package: a definition is a .msg, .srv or .action file below a folder that "
+        "has a package.xml, or below <package>/msg, <package>/srv or <package>/action; an .idl file is in a folder "
+        "named msg, srv or action"
     )
 
 
@@ -261,6 +396,27 @@ def test_prefixes_in_their_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     catalog = Catalog(tuple(found))
     fields = {each: catalog.message(name(f"{each}/msg/A")).fields[0].name for each in "abc"}
     assert fields == {"a": "a", "b": "b", "c": "c"}
+
+
+def test_folders_of_an_installed_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An .idl is in `msg`, and the source where it was: in the last folder of its path, or from Lyrical on in all."""
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    idl_files = {f"share/{each}.idl": "" for each in ("a/msg/A", "a/msg/B", "a/srv/C")}
+    sources = {
+        "share/a/shapes/A.msg": "",
+        "share/a/msg/deep/shapes/B.msg": "",
+        "share/a/api/srv/C.srv": SERVICE,
+    }
+    # What has no such folder is no package of interfaces, and may be large.
+    write(tmp_path, {**idl_files, **sources, "share/doc/other/D.msg": ""})
+    (source,) = prefix_sources()
+    assert {str(each): definition.file for each, definition in source.packages["a"].items()} == {
+        "a/msg/A": f"{tmp_path}/share/a/shapes/A.msg",
+        "a/msg/B": f"{tmp_path}/share/a/msg/deep/shapes/B.msg",
+        "a/srv/C": f"{tmp_path}/share/a/api/srv/C.srv",
+    }
+    assert list(source.packages) == ["a"]
 
 
 def test_everything_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

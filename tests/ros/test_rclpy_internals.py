@@ -12,6 +12,7 @@ import queue
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,11 +24,14 @@ pytest.importorskip("rclpy", reason="needs rclpy: pip install '.[ros]', or sourc
 import rclpy.action.client
 import rclpy.action.server
 import rclpy.client
+import rclpy.duration
 import rclpy.lifecycle
 import rclpy.publisher
 import rclpy.service
 import rclpy.subscription
 import rclpy.task
+import rclpy.time
+from builtin_interfaces.msg import Duration, Time  # type: ignore[import-untyped]
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String  # type: ignore[import-untyped]
@@ -394,3 +398,17 @@ def test_results_come_through_get_result_async(acting: Any) -> None:
     assert sending.result().get_result_async() is done
     assert sending.result().get_result() == "the result"
     assert client.send_goal(Fibonacci.Goal()) == "the result"
+
+
+# --- Time ---
+
+
+def test_stamps_are_read_by_from_msg() -> None:
+    for rclpy_class, ros_class in ((rclpy.time.Time, Time), (rclpy.duration.Duration, Duration)):
+        described = vars(rclpy_class)["from_msg"]
+        assert isinstance(described, classmethod)
+        of_rclpy: Any = inspect.unwrap(described.__func__)
+        assert of_rclpy.__module__ == rclpy_class.__module__
+        assert of_rclpy(rclpy_class, ros_class(sec=1, nanosec=2)).nanoseconds == 10**9 + 2
+        with pytest.raises(TypeError, match="Must pass a builtin_interfaces"):
+            of_rclpy(rclpy_class, SimpleNamespace(sec=1, nanosec=2))

@@ -60,6 +60,21 @@ async def echo_later(request: Any, response: Any) -> Any:
     return echo(request, response)
 
 
+def test_a_service_by_its_own_name(node: Any, set_bool: Any) -> None:
+    from rosidl_proto.std_srvs.srv import SetBool
+
+    asked: queue.Queue[Any] = queue.Queue()
+
+    def answer(request: Any, response: Any) -> Any:
+        asked.put((type(request), type(response)))
+        return SetBool.Response(success=request.data)
+
+    service, client = served(node, SetBool, "own_name", answer)
+    assert service.adapter is client.adapter is set_bool
+    assert client.call(SetBool.Request(data=True), SECONDS) == SetBool.Response(success=True)
+    assert asked.get(timeout=SECONDS) == (SetBool.Request, SetBool.Response)
+
+
 @pytest.mark.parametrize("callback", [echo, echo_later])
 def test_futures(node: Any, set_bool: Any, callback: Any) -> None:
     request = set_bool.request.custom_type(data=True)

@@ -15,14 +15,16 @@ import pytest
 from tests.ros.support import ROOT
 
 FOLDER = Path(__file__).with_name("typing")
+FILES = [FOLDER / "positive.py", FOLDER / "negative.py", ROOT / "examples" / "port" / "with_protobuf.py"]
+STAND_IN = Path(__file__).with_name("stand_in")
 
 
-def expected_errors(file: str) -> set[int]:
-    lines = (FOLDER / file).read_text().splitlines()
+def expected_errors(file: Path) -> set[int]:
+    lines = file.read_text().splitlines()
     return {number for number, line in enumerate(lines, 1) if "# error" in line}
 
 
-def mypy(file: str, generated: Path) -> dict[int, str]:
+def mypy(file: Path, generated: Path) -> dict[int, str]:
     """Return the errors that mypy finds in a file, by line."""
     pytest.importorskip("mypy", reason="needs mypy: pip install '.[test]'")
     result = subprocess.run(
@@ -35,25 +37,26 @@ def mypy(file: str, generated: Path) -> dict[int, str]:
             "json",
             "--config-file",
             "",
-            str(FOLDER / file),
+            str(file),
         ],
-        env={**os.environ, "MYPYPATH": os.pathsep.join([str(generated), str(ROOT)])},
+        env={**os.environ, "MYPYPATH": os.pathsep.join(map(str, (generated, ROOT, STAND_IN)))},
         cwd=generated.parent,
         capture_output=True,
         text=True,
         check=False,
     )
     errors = [json.loads(line) for line in result.stdout.splitlines() if line.startswith("{")]
-    return {error["line"]: error["message"] for error in errors if Path(error["file"]).name == file}
+    return {error["line"]: error["message"] for error in errors if Path(error["file"]).name == file.name}
 
 
-def pyright(file: str, generated: Path) -> dict[int, str]:
+def pyright(file: Path, generated: Path) -> dict[int, str]:
     """Return the errors that pyright finds in a file, by line."""
     pytest.importorskip("pyright", reason="needs pyright: pip install '.[test]'")
-    project = generated.parent / file.removesuffix(".py")
+    project = generated.parent / file.stem
     project.mkdir()
-    shutil.copy(FOLDER / file, project)
-    (project / "pyrightconfig.json").write_text(json.dumps({"extraPaths": [str(generated), str(ROOT)]}))
+    shutil.copy(file, project)
+    paths = [str(generated), str(ROOT), str(STAND_IN)]
+    (project / "pyrightconfig.json").write_text(json.dumps({"extraPaths": paths}))
     result = subprocess.run(
         [sys.executable, "-m", "pyright", "--outputjson", "-p", str(project), "--pythonpath", sys.executable],
         capture_output=True,
@@ -68,8 +71,8 @@ def pyright(file: str, generated: Path) -> dict[int, str]:
 
 
 @pytest.mark.parametrize("check", [mypy, pyright])
-@pytest.mark.parametrize("file", ["positive.py", "negative.py"])
-def test_typing(generated: Path, check: object, file: str) -> None:
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_typing(generated: Path, check: object, file: Path) -> None:
     if not find_spec("rclpy.subscription_content_filter_options"):
         pytest.skip("rclpy before Kilted has few type hints")
     found = check(file, generated)  # type: ignore[operator]

@@ -37,6 +37,7 @@ from rosidl_adapter_proto.schema.conversion import (
     OneValue,
     Step,
     Values,
+    has_defaults,
     message_conversion,
 )
 from rosidl_adapter_proto.schema.numbering import HashNumbering
@@ -146,6 +147,37 @@ def test_an_empty_message_has_nothing_to_convert() -> None:
     proto = proto_file(message, HashNumbering(), lambda name: name).messages[0]
 
     assert message_conversion(proto) == MessageConversion((), ())
+
+
+@pytest.mark.parametrize(
+    ("field", "expected"),
+    [
+        (Field("x", BasicType("int32"), 1), True),
+        (Field("x", BasicType("int32"), 0), True),
+        (Field("x", BasicType("int32")), False),
+        (Field("x", INNER), True),
+        (Field("x", ArrayType(INNER, 2)), True),
+        (Field("x", SequenceType(INNER)), False),
+    ],
+)
+def test_has_defaults(field: Field, expected: bool) -> None:
+    inner = Message(INNER, (Field("y", BasicType("int32"), 3),))
+    assert has_defaults(Message(TypeName("p", "msg", "Outer"), (field,)), lambda name: inner) is expected
+
+
+def test_each_message_is_looked_at_once_for_defaults() -> None:
+    """However often it is referred to, and however deep it is."""
+    found = []
+
+    def find(name: TypeName) -> Message:
+        found.append(name)
+        depth = int(name.name[1:]) + 1
+        nested = TypeName("p", "msg", f"M{depth}")
+        fields = tuple(Field(each, nested if depth < 1500 else BasicType("int32")) for each in "abc")
+        return Message(name, fields)
+
+    assert not has_defaults(find(TypeName("p", "msg", "M0")), find)
+    assert len(found) == len(set(found)) == 1500
 
 
 def test_tables_are_complete() -> None:

@@ -33,7 +33,11 @@ def command(package: str | None, include: tuple[Path, ...], distro: str | None) 
             rows.append((name, str(len(found)), ", ".join(places)))
     else:
         rows = [
-            (str(name), definition.format, definition.file)
+            (
+                str(name),
+                definition.format,
+                " and ".join(filter(None, (definition.other_file, definition.file))),
+            )
             for name, definition in catalog.package(package).items()
         ]
     widths = [max(len(row[column]) for row in rows) for column in range(2)]

@@ -1,7 +1,8 @@
 """The ament index resource `rosidl_proto`: says of which packages protobuf types and adapters are installed.
 
 Every generated package has one, a small JSON file `share/ament_index/resource_index/rosidl_proto/<package>` in the
-prefix that it is installed to. Build hooks look there for what they need not generate again.
+prefix that it is installed to. Build hooks look there for what they need not generate again. An empty file says that a
+package was built without protobuf types, since they could not be made.
 """
 
 from __future__ import annotations
@@ -100,16 +101,38 @@ def installed_package(prefix: Path, name: str) -> GeneratedPackage | None:
     Raises:
         GenerateError: The resource is damaged, or of another version of this program.
     """
-    file = prefix / RESOURCE_FOLDER / name
+    content = _resource(prefix, name)
+    if not content:
+        return None
     try:
-        return GeneratedPackage.from_json(file.read_bytes())
+        return GeneratedPackage.from_json(content)
+    except (ValueError, TypeError, KeyError) as error:
+        raise _unreadable(prefix, name, error) from None
+
+
+def is_skipped(prefix: Path, name: str) -> bool:
+    """Tell whether a package in a prefix was built without protobuf types, since they could not be made.
+
+    Raises:
+        GenerateError: The resource cannot be read.
+    """
+    return _resource(prefix, name) == b""
+
+
+def _resource(prefix: Path, name: str) -> bytes | None:
+    try:
+        return (prefix / RESOURCE_FOLDER / name).read_bytes()
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise GenerateError(
-            f"{file} is not a resource that this version of rosidl-proto reads ({error}); "
-            "install its package again, or remove the file"
-        ) from None
+    except OSError as error:
+        raise _unreadable(prefix, name, error) from None
+
+
+def _unreadable(prefix: Path, name: str, error: Exception) -> GenerateError:
+    return GenerateError(
+        f"{prefix / RESOURCE_FOLDER / name} is not a resource that this version of rosidl-proto reads ({error}); "
+        "install its package again, or remove the file"
+    )
 
 
 def installed_packages(prefixes: Iterable[Path]) -> Mapping[str, InstalledPackage]:

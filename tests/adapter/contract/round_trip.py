@@ -88,11 +88,11 @@ def main() -> None:
     part = msg.PartAdapter.convert_to_custom(everything().part)
     assert msg.PartAdapter.convert_to_custom(msg.PartAdapter.convert_to_ros_message(part)) == part
 
-    filled, groups = {adapter: custom, msg.PartAdapter: part}, []
+    filled, groups = {adapter: custom, msg.PartAdapter: part}, set()
     for package in (msg, srv, action):
         for found in (getattr(package, name) for name in package.__all__):
             if issubclass(found, (ServiceAdapter, ActionAdapter)):
-                groups.append(found)
+                groups.add(found)  # also by the name of the service or action
             elif issubclass(found, TypeAdapter):
                 data = found.codec.to_cdr(filled.get(found, found.new()))
                 assert found not in filled or found.codec.from_cdr(data) == filled[found]

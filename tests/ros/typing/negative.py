@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta, timezone
 from typing import Any
 
 from rclpy.action.server import CancelResponse, GoalResponse
-from rosidl_proto.std_msgs.msg import Int8, String, StringAdapter
+from rosidl_proto.builtin_interfaces.msg import Duration, Time
+from rosidl_proto.std_msgs.msg import Header, HeaderAdapter, Int8, String, StringAdapter
 from rosidl_proto.std_srvs.srv import (
+    SetBool,
     SetBool_Request,
     SetBool_Response,
     SetBoolAdapter,
+    Trigger,
     Trigger_Request,
     Trigger_Response,
     TriggerAdapter,
 )
 from rosidl_proto.test_msgs.action import (
+    Fibonacci,
     Fibonacci_Feedback,
     Fibonacci_Goal,
     Fibonacci_Result,
     FibonacciAdapter,
+    NestedMessage,
     NestedMessage_Feedback,
     NestedMessage_Goal,
     NestedMessage_Result,
@@ -34,6 +40,12 @@ from rosidl_adapter_proto.ros import (
     create_publisher,
     create_service,
     create_subscription,
+    set_stamp,
+    to_datetime,
+    to_message,
+    to_rclpy_duration,
+    to_rclpy_time,
+    to_timedelta,
 )
 
 
@@ -161,6 +173,68 @@ def serve(node: Node) -> None:
     node.create_service(StringAdapter, "set", print)  # error
     service = node.create_service(SetBoolAdapter, "set", on_request)
     service.send_response(Trigger_Response(), None)  # error
+
+
+def on_request_by_name(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+    response.messag = str(request.dat)  # error
+    return response
+
+
+def on_trigger_by_name(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    return response
+
+
+def serve_by_name(node: Node) -> None:
+    node.create_service(SetBool, "set", on_request_by_name)
+    node.create_service(SetBool, "set", on_trigger_by_name)  # error
+    node.create_service(SetBool, "set", on_requests)  # error
+    node.create_service(SetBool, "set", answer_with_trigger)  # error
+    node.create_service(Fibonacci, "set", print)  # error
+    create_service(node, SetBool, "set", on_trigger)  # error
+    client = node.create_client(SetBool, "set")
+    client.call_async(Trigger.Request())  # error
+    client.call_async(SetBool.Response())  # error
+    client.call_async(SetBool.Request(dat=True))  # error
+    create_client(node, Trigger, "set").call(SetBool.Request())  # error
+    node.create_client(Fibonacci, "set")  # error
+    node.create_publisher(SetBool, "set", 10)  # error
+
+
+def act_by_name(node: Node) -> None:
+    ActionServer(node, Fibonacci, "fibonacci", execute)
+    ActionServer(node, NestedMessage, "fibonacci", execute)  # error
+    ActionServer(node, SetBool, "fibonacci", execute)  # error
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    client.send_goal_async(NestedMessage.Goal())  # error
+    client.send_goal_async(Fibonacci.Result())  # error
+    ActionClient(node, SetBool, "fibonacci")  # error
+
+
+def make() -> None:
+    HeaderAdapter.new(fram_id="map")  # error
+    HeaderAdapter.new(frame_id=3)  # error
+    HeaderAdapter.new("map")  # error
+    SetBool.request.new(dat=True)  # error
+    Fibonacci.goal.new(ordre=3)  # error
+    header: Header = StringAdapter.new(data="text")  # error
+    print(header)
+
+
+def convert(node: Node) -> None:
+    now = node.get_clock().now()
+    header = Header()
+    Header(stamp=now)  # error
+    Header(stamp=to_message(now, Duration))  # error
+    header.stamp = to_message(now, Time)  # error
+    set_stamp("header", now)  # error
+    set_stamp(header, "now")  # error
+    set_stamp(header, timedelta(seconds=1))  # error
+    to_message(now, String)  # error
+    to_datetime(header)  # error
+    to_datetime(timedelta(seconds=1))  # error
+    to_timedelta(now)  # error
+    to_rclpy_time(String())  # error
+    to_rclpy_duration(datetime.now(timezone.utc))  # error
 
 
 def call(node: Node) -> None:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta, timezone
 from typing import Any
 
 import rclpy.client
+import rclpy.duration
 import rclpy.lifecycle
 import rclpy.node
 import rclpy.publisher
 import rclpy.service
 import rclpy.subscription
+import rclpy.time
 import std_msgs.msg  # type: ignore[import-untyped]
 import std_srvs.srv  # type: ignore[import-untyped]
 import test_msgs.action  # type: ignore[import-untyped]
+from google.protobuf.timestamp_pb2 import Timestamp
 from rclpy.action.server import CancelResponse, GoalResponse
 from rclpy.subscription import MessageInfo
-from rosidl_proto.std_msgs.msg import String, StringAdapter
-from rosidl_proto.std_srvs.srv import SetBool_Request, SetBool_Response, SetBoolAdapter
+from rosidl_proto.builtin_interfaces.msg import Duration, Time
+from rosidl_proto.std_msgs.msg import Header, HeaderAdapter, String, StringAdapter
+from rosidl_proto.std_srvs.srv import SetBool, SetBool_Request, SetBool_Response, SetBoolAdapter
 from rosidl_proto.test_msgs.action import (
+    Fibonacci,
     Fibonacci_Feedback,
     Fibonacci_Goal,
     Fibonacci_Result,
@@ -42,6 +48,13 @@ from rosidl_adapter_proto.ros import (
     create_publisher,
     create_service,
     create_subscription,
+    set_stamp,
+    to_datetime,
+    to_message,
+    to_nanoseconds,
+    to_rclpy_duration,
+    to_rclpy_time,
+    to_timedelta,
 )
 
 
@@ -51,6 +64,13 @@ class Native:
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
         return {}
+
+
+class NativeService:
+    """Stands for a ROS service class."""
+
+    Request = Native
+    Response = Native
 
 
 class Talker(Node):
@@ -184,6 +204,48 @@ def check_ros_types(talker: Talker) -> None:
     ActionServer(talker, test_msgs.action.Fibonacci, "native", print)
     ActionClient(talker, test_msgs.action.Fibonacci, "native")
     print(service, client)
+    talker.create_service(NativeService, "native", print)
+    talker.create_client(NativeService, "native").call_async(Native())
+
+
+def check_names_of_services_and_actions(talker: Talker) -> None:
+    """They stand for their adapters, and have the protobuf classes under the names of ROS."""
+
+    def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        response.success = request.data
+        return response
+
+    def execute(
+        goal_handle: ServerGoalHandle[Fibonacci.Goal, Fibonacci.Result, Fibonacci.Feedback],
+    ) -> Fibonacci.Result:
+        goal_handle.publish_feedback(Fibonacci.Feedback(sequence=[1]))
+        return Fibonacci.Result()
+
+    assert_type(talker.create_service(SetBool, "set", answer), Service[SetBool_Request, SetBool_Response])
+    client = talker.create_client(SetBool, "set")
+    assert_type(client, Client[SetBool_Request, SetBool_Response])
+    assert_type(client.call(SetBool.Request(data=True)), SetBool_Response | None)
+    server = ActionServer(talker, Fibonacci, "fibonacci", execute)
+    assert_type(server, ActionServer[Fibonacci_Goal, Fibonacci_Result, Fibonacci_Feedback])
+    ActionClient(talker, Fibonacci, "fibonacci").send_goal_async(Fibonacci.Goal(order=1))
+
+
+def check_times(talker: Talker) -> None:
+    now = talker.get_clock().now()
+    header = HeaderAdapter.new(frame_id="map", stamp=to_message(now, Time))
+    assert_type(header, Header)
+    times = (now, now.to_msg(), header.stamp, Timestamp(), datetime.now(timezone.utc), 5)
+    for time in times:
+        set_stamp(header, time)
+    assert_type(to_message(now, Timestamp), Timestamp)
+    assert_type(to_message(header.stamp, Time), Time)
+    assert_type(to_datetime(header.stamp), datetime)
+    assert_type(to_rclpy_time(header.stamp), rclpy.time.Time)
+    assert_type(now - to_rclpy_time(header.stamp, now.clock_type), rclpy.duration.Duration)
+    assert_type(to_timedelta(Duration(sec=1)), timedelta)
+    assert_type(to_rclpy_duration(timedelta(seconds=1)), rclpy.duration.Duration)
+    assert_type(to_message(now - now, Duration), Duration)
+    assert_type(to_nanoseconds(now) + to_nanoseconds(now - now), int)
 
 
 def check_functions(node: rclpy.node.Node, mixed: NodeMixin) -> None:

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rosidl_adapter_proto.adapter.contract import RESERVED_NAMES
+from rosidl_adapter_proto.adapter.contract import constant_name
 from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines, plain_lines
 from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer
 from rosidl_adapter_proto.generate.targets.python.names import Names
-from rosidl_adapter_proto.interfaces.model import Interface, Message, SequenceType, TypeName, references
-from rosidl_adapter_proto.schema.conversion import message_conversion, ros_class
+from rosidl_adapter_proto.interfaces.model import Interface, TypeName
+from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
 from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue
 
 
@@ -69,14 +69,16 @@ class GroupAdapter:
     """The class that groups the adapters of a service or an action.
 
     Attributes:
+        name: The name of the service or action, by which ROS users know it; here it is the adapter.
         base: `ServiceAdapter` or `ActionAdapter`.
-        parameters: The protobuf classes that the base is parametrized with.
+        custom_types: The protobuf classes that the base is parametrized with, and what each is called in ROS.
         parts: What it has, and the class that each is.
     """
 
+    name: str
     class_name: str
     base: str
-    parameters: tuple[str, ...]
+    custom_types: tuple[tuple[str, str], ...]
     type_name: str
     type_hash: str
     ros_class: str
@@ -101,7 +103,7 @@ def message_adapter(
         ros_class=ros_class(proto.type_name, interface),
         comment=docstring_lines(proto.source.comment),
         constants=tuple(
-            AdapterConstant(_constant_name(each.name), _literal(each.value), plain_lines(each.comment))
+            AdapterConstant(constant_name(each.name), _literal(each.value), plain_lines(each.comment))
             for each in proto.constants
         ),
         packed_numbers=conversion.packed_numbers,
@@ -110,7 +112,7 @@ def message_adapter(
             for each in proto.fields
         ),
         defaults=_defaults(proto),
-        has_defaults=_has_defaults(proto.source, names),
+        has_defaults=has_defaults(proto.source, names.catalog.message),
     )
 
 
@@ -124,27 +126,17 @@ def _field_info(field: ProtoField, adapter_names: Mapping[TypeName, str]) -> str
     return ", ".join(map(str, arguments))
 
 
-def _constant_name(name: str) -> str:
-    """Return the attribute of a constant; not one that adapters have already, as an `.idl` may name it."""
-    return f"{name}_" if name in RESERVED_NAMES else name
-
-
-_GROUPS = {
-    "request": ("ServiceAdapter", ("request", "response")),
-    "goal": ("ActionAdapter", ("goal", "result", "feedback")),
-}
-"""The base class of a group, and the parts that it is parametrized with, by the first part."""
-
-
 def group_adapter(
     name: TypeName, group: Mapping[str, TypeName], interface: Interface, names: Names
 ) -> GroupAdapter:
     """Decide what the class is that groups the adapters of a service or an action of an interface."""
-    base, parameters = _GROUPS[next(iter(group))]
     return GroupAdapter(
+        name=name.name,
         class_name=names.adapter(name),
-        base=base,
-        parameters=tuple(group[part].name for part in parameters),
+        base="ServiceAdapter" if "request" in group else "ActionAdapter",
+        custom_types=tuple(
+            (NAMED_PARTS[part], each.name) for part, each in group.items() if part in NAMED_PARTS
+        ),
         type_name=str(name),
         type_hash=names.catalog.hash(name),
         ros_class=ros_class(name, interface),
@@ -156,17 +148,6 @@ def _defaults(proto: ProtoMessage) -> str:
     """Return the default values of a message as the Python text of a dictionary, in terms of protobuf."""
     items = [f"{each.name!r}: {_literal(each.default)}" for each in proto.fields if each.default is not None]
     return "{" + ", ".join(items) + "}" if items else ""
-
-
-def _has_defaults(message: Message, names: Names) -> bool:
-    if any(each.default is not None for each in message.fields):
-        return True
-    # A sequence is empty by default, whatever its elements are.
-    return any(
-        _has_defaults(names.catalog.message(name), names)
-        for field, name in references(message)
-        if not isinstance(field.type, SequenceType)
-    )
 
 
 def _literal(value: ProtoValue) -> str:

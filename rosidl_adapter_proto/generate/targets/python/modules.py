@@ -110,7 +110,8 @@ def _local_adapter_names(file: ProtoFile, names: Names) -> dict[TypeName, str]:
     """
     own = {message.source.name for message in file.messages}
     local = {name: names.adapter(name) for name in own}
-    taken = {*local.values(), *(name.name for name in own), names.adapter(file.source.name)}
+    groups = parts(file.source)
+    taken = {*local.values(), *map(names.adapter, groups), *(name.name for name in (*own, *groups))}
     referred = {name for message in file.messages for _, name in references(message.source)}
     for name in sorted(referred - own):
         class_name = names.adapter(name)

@@ -43,9 +43,9 @@ def exports(file: ProtoFile, names: Names) -> dict[str, str]:
     """Return every public name of the modules of a file, and the module, relative to the package, that has it."""
     interface = file.source
     own = [each.type_name for each in file.messages]
+    groups = parts(interface)
+    of_adapters = (*map(names.adapter, (*own, *groups)), *(each.name for each in groups))
     return {
         **dict.fromkeys((each.name for each in own), f"{interface.name.name}_pb2"),
-        **dict.fromkeys(
-            (names.adapter(each) for each in (*own, *parts(interface))), f"{interface.name.name}_adapter"
-        ),
+        **dict.fromkeys(of_adapters, f"{interface.name.name}_adapter"),
     }

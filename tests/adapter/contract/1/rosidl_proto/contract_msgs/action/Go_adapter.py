@@ -530,6 +530,11 @@ class Go_SendGoalAdapter(
     ros_class = "contract_msgs.action:Go.Impl.SendGoalService"
     request: type[Go_SendGoal_RequestAdapter] = Go_SendGoal_RequestAdapter
     response: type[Go_SendGoal_ResponseAdapter] = Go_SendGoal_ResponseAdapter
+    Request: typing.TypeAlias = Go_SendGoal_Request
+    Response: typing.TypeAlias = Go_SendGoal_Response
+
+
+Go_SendGoal = Go_SendGoalAdapter
 
 
 class Go_GetResultAdapter(
@@ -544,6 +549,11 @@ class Go_GetResultAdapter(
     ros_class = "contract_msgs.action:Go.Impl.GetResultService"
     request: type[Go_GetResult_RequestAdapter] = Go_GetResult_RequestAdapter
     response: type[Go_GetResult_ResponseAdapter] = Go_GetResult_ResponseAdapter
+    Request: typing.TypeAlias = Go_GetResult_Request
+    Response: typing.TypeAlias = Go_GetResult_Response
+
+
+Go_GetResult = Go_GetResultAdapter
 
 
 class GoAdapter(adapter.ActionAdapter[Go_Goal, Go_Result, Go_Feedback]):
@@ -560,3 +570,9 @@ class GoAdapter(adapter.ActionAdapter[Go_Goal, Go_Result, Go_Feedback]):
     send_goal: type[Go_SendGoalAdapter] = Go_SendGoalAdapter
     get_result: type[Go_GetResultAdapter] = Go_GetResultAdapter
     feedback_message: type[Go_FeedbackMessageAdapter] = Go_FeedbackMessageAdapter
+    Goal: typing.TypeAlias = Go_Goal
+    Result: typing.TypeAlias = Go_Result
+    Feedback: typing.TypeAlias = Go_Feedback
+
+
+Go = GoAdapter

@@ -7,6 +7,7 @@ from rosidl_adapter_proto import adapter as _adapter
 _adapter.require_contract(1, __name__)
 
 if _typing.TYPE_CHECKING:
+    from rosidl_proto.contract_msgs.action.Go_adapter import Go as Go
     from rosidl_proto.contract_msgs.action.Go_adapter import GoAdapter as GoAdapter
     from rosidl_proto.contract_msgs.action.Go_pb2 import Go_Feedback as Go_Feedback
     from rosidl_proto.contract_msgs.action.Go_adapter import (
@@ -17,6 +18,9 @@ if _typing.TYPE_CHECKING:
     )
     from rosidl_proto.contract_msgs.action.Go_adapter import (
         Go_FeedbackMessageAdapter as Go_FeedbackMessageAdapter,
+    )
+    from rosidl_proto.contract_msgs.action.Go_adapter import (
+        Go_GetResult as Go_GetResult,
     )
     from rosidl_proto.contract_msgs.action.Go_adapter import (
         Go_GetResultAdapter as Go_GetResultAdapter,
@@ -41,6 +45,7 @@ if _typing.TYPE_CHECKING:
     from rosidl_proto.contract_msgs.action.Go_adapter import (
         Go_ResultAdapter as Go_ResultAdapter,
     )
+    from rosidl_proto.contract_msgs.action.Go_adapter import Go_SendGoal as Go_SendGoal
     from rosidl_proto.contract_msgs.action.Go_adapter import (
         Go_SendGoalAdapter as Go_SendGoalAdapter,
     )
@@ -58,11 +63,13 @@ if _typing.TYPE_CHECKING:
     )
 
 __all__ = (
+    "Go",
     "GoAdapter",
     "Go_Feedback",
     "Go_FeedbackAdapter",
     "Go_FeedbackMessage",
     "Go_FeedbackMessageAdapter",
+    "Go_GetResult",
     "Go_GetResultAdapter",
     "Go_GetResult_Request",
     "Go_GetResult_RequestAdapter",
@@ -72,6 +79,7 @@ __all__ = (
     "Go_GoalAdapter",
     "Go_Result",
     "Go_ResultAdapter",
+    "Go_SendGoal",
     "Go_SendGoalAdapter",
     "Go_SendGoal_Request",
     "Go_SendGoal_RequestAdapter",
@@ -83,11 +91,13 @@ if not _typing.TYPE_CHECKING:
     __getattr__, __dir__ = _adapter.lazy_exports(
         __name__,
         {
+            "Go": "Go_adapter",
             "GoAdapter": "Go_adapter",
             "Go_Feedback": "Go_pb2",
             "Go_FeedbackAdapter": "Go_adapter",
             "Go_FeedbackMessage": "Go_pb2",
             "Go_FeedbackMessageAdapter": "Go_adapter",
+            "Go_GetResult": "Go_adapter",
             "Go_GetResultAdapter": "Go_adapter",
             "Go_GetResult_Request": "Go_pb2",
             "Go_GetResult_RequestAdapter": "Go_adapter",
@@ -97,6 +107,7 @@ if not _typing.TYPE_CHECKING:
             "Go_GoalAdapter": "Go_adapter",
             "Go_Result": "Go_pb2",
             "Go_ResultAdapter": "Go_adapter",
+            "Go_SendGoal": "Go_adapter",
             "Go_SendGoalAdapter": "Go_adapter",
             "Go_SendGoal_Request": "Go_pb2",
             "Go_SendGoal_RequestAdapter": "Go_adapter",

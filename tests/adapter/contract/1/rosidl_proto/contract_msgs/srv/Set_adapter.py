@@ -155,3 +155,8 @@ class SetAdapter(adapter.ServiceAdapter[Set_Request, Set_Response]):
     ros_class = "contract_msgs.srv:Set"
     request: type[Set_RequestAdapter] = Set_RequestAdapter
     response: type[Set_ResponseAdapter] = Set_ResponseAdapter
+    Request: typing.TypeAlias = Set_Request
+    Response: typing.TypeAlias = Set_Response
+
+
+Set = SetAdapter

@@ -7,6 +7,7 @@ from rosidl_adapter_proto import adapter as _adapter
 _adapter.require_contract(1, __name__)
 
 if _typing.TYPE_CHECKING:
+    from rosidl_proto.contract_msgs.srv.Set_adapter import Set as Set
     from rosidl_proto.contract_msgs.srv.Set_adapter import SetAdapter as SetAdapter
     from rosidl_proto.contract_msgs.srv.Set_pb2 import Set_Request as Set_Request
     from rosidl_proto.contract_msgs.srv.Set_adapter import (
@@ -18,6 +19,7 @@ if _typing.TYPE_CHECKING:
     )
 
 __all__ = (
+    "Set",
     "SetAdapter",
     "Set_Request",
     "Set_RequestAdapter",
@@ -29,6 +31,7 @@ if not _typing.TYPE_CHECKING:
     __getattr__, __dir__ = _adapter.lazy_exports(
         __name__,
         {
+            "Set": "Set_adapter",
             "SetAdapter": "Set_adapter",
             "Set_Request": "Set_pb2",
             "Set_RequestAdapter": "Set_adapter",

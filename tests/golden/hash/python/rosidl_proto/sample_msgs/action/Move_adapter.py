@@ -518,6 +518,11 @@ class Move_SendGoalAdapter(
     ros_class = "sample_msgs.action:Move.Impl.SendGoalService"
     request: type[Move_SendGoal_RequestAdapter] = Move_SendGoal_RequestAdapter
     response: type[Move_SendGoal_ResponseAdapter] = Move_SendGoal_ResponseAdapter
+    Request: typing.TypeAlias = Move_SendGoal_Request
+    Response: typing.TypeAlias = Move_SendGoal_Response
+
+
+Move_SendGoal = Move_SendGoalAdapter
 
 
 class Move_GetResultAdapter(
@@ -532,6 +537,11 @@ class Move_GetResultAdapter(
     ros_class = "sample_msgs.action:Move.Impl.GetResultService"
     request: type[Move_GetResult_RequestAdapter] = Move_GetResult_RequestAdapter
     response: type[Move_GetResult_ResponseAdapter] = Move_GetResult_ResponseAdapter
+    Request: typing.TypeAlias = Move_GetResult_Request
+    Response: typing.TypeAlias = Move_GetResult_Response
+
+
+Move_GetResult = Move_GetResultAdapter
 
 
 class MoveAdapter(adapter.ActionAdapter[Move_Goal, Move_Result, Move_Feedback]):
@@ -548,3 +558,9 @@ class MoveAdapter(adapter.ActionAdapter[Move_Goal, Move_Result, Move_Feedback]):
     send_goal: type[Move_SendGoalAdapter] = Move_SendGoalAdapter
     get_result: type[Move_GetResultAdapter] = Move_GetResultAdapter
     feedback_message: type[Move_FeedbackMessageAdapter] = Move_FeedbackMessageAdapter
+    Goal: typing.TypeAlias = Move_Goal
+    Result: typing.TypeAlias = Move_Result
+    Feedback: typing.TypeAlias = Move_Feedback
+
+
+Move = MoveAdapter

@@ -7,6 +7,7 @@ from rosidl_adapter_proto import adapter as _adapter
 _adapter.require_contract(1, __name__)
 
 if _typing.TYPE_CHECKING:
+    from rosidl_proto.sample_msgs.action.Move_adapter import Move as Move
     from rosidl_proto.sample_msgs.action.Move_adapter import MoveAdapter as MoveAdapter
     from rosidl_proto.sample_msgs.action.Move_pb2 import Move_Feedback as Move_Feedback
     from rosidl_proto.sample_msgs.action.Move_adapter import (
@@ -17,6 +18,9 @@ if _typing.TYPE_CHECKING:
     )
     from rosidl_proto.sample_msgs.action.Move_adapter import (
         Move_FeedbackMessageAdapter as Move_FeedbackMessageAdapter,
+    )
+    from rosidl_proto.sample_msgs.action.Move_adapter import (
+        Move_GetResult as Move_GetResult,
     )
     from rosidl_proto.sample_msgs.action.Move_adapter import (
         Move_GetResultAdapter as Move_GetResultAdapter,
@@ -42,6 +46,9 @@ if _typing.TYPE_CHECKING:
         Move_ResultAdapter as Move_ResultAdapter,
     )
     from rosidl_proto.sample_msgs.action.Move_adapter import (
+        Move_SendGoal as Move_SendGoal,
+    )
+    from rosidl_proto.sample_msgs.action.Move_adapter import (
         Move_SendGoalAdapter as Move_SendGoalAdapter,
     )
     from rosidl_proto.sample_msgs.action.Move_pb2 import (
@@ -58,11 +65,13 @@ if _typing.TYPE_CHECKING:
     )
 
 __all__ = (
+    "Move",
     "MoveAdapter",
     "Move_Feedback",
     "Move_FeedbackAdapter",
     "Move_FeedbackMessage",
     "Move_FeedbackMessageAdapter",
+    "Move_GetResult",
     "Move_GetResultAdapter",
     "Move_GetResult_Request",
     "Move_GetResult_RequestAdapter",
@@ -72,6 +81,7 @@ __all__ = (
     "Move_GoalAdapter",
     "Move_Result",
     "Move_ResultAdapter",
+    "Move_SendGoal",
     "Move_SendGoalAdapter",
     "Move_SendGoal_Request",
     "Move_SendGoal_RequestAdapter",
@@ -83,11 +93,13 @@ if not _typing.TYPE_CHECKING:
     __getattr__, __dir__ = _adapter.lazy_exports(
         __name__,
         {
+            "Move": "Move_adapter",
             "MoveAdapter": "Move_adapter",
             "Move_Feedback": "Move_pb2",
             "Move_FeedbackAdapter": "Move_adapter",
             "Move_FeedbackMessage": "Move_pb2",
             "Move_FeedbackMessageAdapter": "Move_adapter",
+            "Move_GetResult": "Move_adapter",
             "Move_GetResultAdapter": "Move_adapter",
             "Move_GetResult_Request": "Move_pb2",
             "Move_GetResult_RequestAdapter": "Move_adapter",
@@ -97,6 +109,7 @@ if not _typing.TYPE_CHECKING:
             "Move_GoalAdapter": "Move_adapter",
             "Move_Result": "Move_pb2",
             "Move_ResultAdapter": "Move_adapter",
+            "Move_SendGoal": "Move_adapter",
             "Move_SendGoalAdapter": "Move_adapter",
             "Move_SendGoal_Request": "Move_pb2",
             "Move_SendGoal_RequestAdapter": "Move_adapter",

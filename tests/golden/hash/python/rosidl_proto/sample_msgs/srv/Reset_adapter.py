@@ -150,3 +150,8 @@ class ResetAdapter(adapter.ServiceAdapter[Reset_Request, Reset_Response]):
     ros_class = "sample_msgs.srv:Reset"
     request: type[Reset_RequestAdapter] = Reset_RequestAdapter
     response: type[Reset_ResponseAdapter] = Reset_ResponseAdapter
+    Request: typing.TypeAlias = Reset_Request
+    Response: typing.TypeAlias = Reset_Response
+
+
+Reset = ResetAdapter

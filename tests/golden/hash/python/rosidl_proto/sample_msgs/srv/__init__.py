@@ -7,6 +7,7 @@ from rosidl_adapter_proto import adapter as _adapter
 _adapter.require_contract(1, __name__)
 
 if _typing.TYPE_CHECKING:
+    from rosidl_proto.sample_msgs.srv.Reset_adapter import Reset as Reset
     from rosidl_proto.sample_msgs.srv.Reset_adapter import ResetAdapter as ResetAdapter
     from rosidl_proto.sample_msgs.srv.Reset_pb2 import Reset_Request as Reset_Request
     from rosidl_proto.sample_msgs.srv.Reset_adapter import (
@@ -18,6 +19,7 @@ if _typing.TYPE_CHECKING:
     )
 
 __all__ = (
+    "Reset",
     "ResetAdapter",
     "Reset_Request",
     "Reset_RequestAdapter",
@@ -29,6 +31,7 @@ if not _typing.TYPE_CHECKING:
     __getattr__, __dir__ = _adapter.lazy_exports(
         __name__,
         {
+            "Reset": "Reset_adapter",
             "ResetAdapter": "Reset_adapter",
             "Reset_Request": "Reset_pb2",
             "Reset_RequestAdapter": "Reset_adapter",
