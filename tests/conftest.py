@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -66,3 +67,11 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", folder, root, folder=folder)
     (file,) = folder.glob("*.whl")
     return file
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C interrupt this program, and those that it starts: the shell has jobs in the background ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -1,4 +1,4 @@
-"""Characters of `.idl`: what protobuf and ROS have of each other, on every way between them."""
+"""Characters of `.idl`: what ROS and protobuf have of them, and that every way of conversion agrees."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from rosidl_adapter_proto import TypeRegistry, adapter_for
 from rosidl_adapter_proto.errors import ConversionError, DefinitionError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.catalog import Catalog
@@ -17,33 +18,31 @@ from rosidl_adapter_proto.interfaces.idl import parse_idl
 from rosidl_adapter_proto.interfaces.model import TypeName
 from tests.folders import write_package
 
-
-def generate_foo(package: str, members: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Generate a message `Foo`, and return its module."""
-    text = f"module {package} {{ module msg {{ struct Foo {{ {members} }}; }}; }};"
-    write_package(folder / package, {"msg/Foo.idl": text})
-    catalog = Catalog((folder_source(folder / package),))
-    generate(Request((package,)), catalog, folder / "out", Options(python_root=f"{package}_root"))
-    monkeypatch.syspath_prepend(folder / "out" / "python")
-    return importlib.import_module(f"{package}_root.{package}.msg")
-
-
 CHARACTERS = "char one; wchar wide; sequence<char, 3> many; sequence<wchar, 3> wides; wchar two[2];"
 
 
-@pytest.fixture
-def characters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    generated = generate_foo("characters", CHARACTERS, tmp_path, monkeypatch)
-    generated.FooAdapter.ros_message_type = SimpleNamespace
-    return generated
+@pytest.fixture(params=["generated", "run time"])
+def adapter(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """An adapter of a message that has them, whose ROS message is a namespace."""
+    package = f"characters_{request.param.replace(' ', '_')}"
+    text = f"module {package} {{ module msg {{ struct Foo {{ {CHARACTERS} }}; }}; }};"
+    catalog = Catalog((folder_source(write_package(tmp_path / package, {"msg/Foo.idl": text})),))
+    if request.param == "generated":
+        generate(Request((package,)), catalog, tmp_path / "out", Options(python_root=f"{package}_root"))
+        monkeypatch.syspath_prepend(tmp_path / "out" / "python")
+        made: Any = importlib.import_module(f"{package}_root.{package}.msg").FooAdapter
+    else:
+        made = adapter_for(f"{package}/msg/Foo", TypeRegistry(catalog))
+    made.ros_message_type = SimpleNamespace
+    return made
 
 
-def test_characters(characters: Any) -> None:
+def test_characters(adapter: Any) -> None:
     """Wide characters are UTF-16 code units, of which text in protobuf has pairs as one character."""
-    message = characters.Foo(
+    message = adapter.custom_type(
         one=0x7F, wide=0xD800, many="a\x7f", wides="a\N{GRINNING FACE}", two="\N{GRINNING FACE}"
     )
-    converted = characters.FooAdapter.convert_to_ros_message(message)
+    converted = adapter.convert_to_ros_message(message)
     assert vars(converted) == {
         "one": "\x7f",
         "wide": "\ud800",
@@ -51,11 +50,11 @@ def test_characters(characters: Any) -> None:
         "wides": ["a", "\ud83d", "\ude00"],
         "two": ["\ud83d", "\ude00"],
     }
-    assert characters.FooAdapter.convert_to_custom(converted) == message
-    cdr = characters.FooAdapter.to_cdr(message)
+    assert adapter.convert_to_custom(converted) == message
+    cdr = adapter.to_cdr(message)
     units = b"\3\0\0\0a\0\x3d\xd8\x00\xde\x3d\xd8\x00\xde"
     assert cdr == b"\0\1\0\0\x7f\0\x00\xd8\2\0\0\0a\x7f\0\0" + units
-    assert characters.FooAdapter.from_cdr(cdr) == message
+    assert adapter.from_cdr(cdr) == message
 
 
 @pytest.mark.parametrize(
@@ -72,11 +71,9 @@ def test_characters(characters: Any) -> None:
         ({"two": "a\N{GRINNING FACE}"}, "two"),
     ],
 )
-def test_protobuf_characters_that_ros_does_not_have(
-    characters: Any, fields: dict[str, Any], field: str
-) -> None:
-    message = characters.Foo(**fields)
-    for convert in (characters.FooAdapter.to_cdr, characters.FooAdapter.convert_to_ros_message):
+def test_protobuf_characters_that_ros_does_not_have(adapter: Any, fields: dict[str, Any], field: str) -> None:
+    message = adapter.custom_type(**fields)
+    for convert in (adapter.to_cdr, adapter.convert_to_ros_message):
         with pytest.raises(ConversionError) as caught:
             convert(message)
         assert caught.value.field_path == field
@@ -92,12 +89,10 @@ def test_protobuf_characters_that_ros_does_not_have(
         ({"two": ["\ude00", "\ud83d"]}, "two"),
     ],
 )
-def test_ros_characters_that_protobuf_does_not_have(
-    characters: Any, fields: dict[str, Any], field: str
-) -> None:
+def test_ros_characters_that_protobuf_does_not_have(adapter: Any, fields: dict[str, Any], field: str) -> None:
     values = {"one": "a", "wide": "b", "many": [], "wides": [], "two": ["c", "d"], **fields}
     with pytest.raises(ConversionError) as caught:
-        characters.FooAdapter.convert_to_custom(SimpleNamespace(**values))
+        adapter.convert_to_custom(SimpleNamespace(**values))
     assert caught.value.field_path == field
 
 
@@ -110,9 +105,9 @@ def test_ros_characters_that_protobuf_does_not_have(
         (bytes(12) + b"\x00\xde\x3d\xd8", "two[0]"),
     ],
 )
-def test_cdr_characters_that_protobuf_does_not_have(characters: Any, cdr: bytes, field: str) -> None:
+def test_cdr_characters_that_protobuf_does_not_have(adapter: Any, cdr: bytes, field: str) -> None:
     with pytest.raises(ConversionError) as caught:
-        characters.FooAdapter.from_cdr(b"\0\1\0\0" + cdr)
+        adapter.from_cdr(b"\0\1\0\0" + cdr)
     assert caught.value.field_path == field
 
 

@@ -120,7 +120,7 @@ main(["generate", "src"])
 """
 
 
-def test_control_c(my_msgs: Path, folder: Path) -> None:
+def test_control_c(my_msgs: Path, folder: Path, interruptible: None) -> None:
     assert call("generate", "src").returncode == 0
     before = content(folder)
     (my_msgs / "msg" / "A.msg").write_text("int8 a\n")

@@ -336,7 +336,9 @@ def test_failing_while_moving(output: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert files_in(output) == NEW
 
 
-def test_an_interrupt_while_moving_waits(output: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_while_moving_waits(
+    output: Path, monkeypatch: pytest.MonkeyPatch, interruptible: None
+) -> None:
     replace = Path.replace
 
     def interrupted(path: Path, target: Path) -> Path:

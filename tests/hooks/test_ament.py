@@ -192,6 +192,46 @@ def test_sequential_numbers(build: Path, folder: Path) -> None:
     assert list(json.loads(lock_file.read_text())["messages"]) == ["track_msgs/msg/Track"]
 
 
+def test_the_lock_file_of_another_branch(
+    build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A build follows its lock file; where that is lost, the folder of the build knows the numbers."""
+    definition, lock_file = folder / "src/track_msgs/msg/Track.msg", folder / "numbers.lock"
+    definition.write_text("uint32 id\nuint8[] data\n")
+    with build.open("a") as arguments:
+        arguments.write(f"--numbering\nsequential\n--lock-file\n{lock_file}\n")
+    assert run("generate", build) == 0
+    assert capsys.readouterr().err == (
+        f"Warning: {lock_file} is new: it keeps the numbers of fields, so commit it\n"
+    )
+    lock_file.write_text(lock_file.read_text().replace('"2 bytes ', '"5 bytes '))
+
+    assert run("generate", build) == 0
+    proto = folder / "build/package/proto/track_msgs/msg/Track.proto"
+    assert "bytes data = 5;" in proto.read_text()
+
+    lock_file.unlink()
+    assert run("generate", build) == 1
+    package = folder / "build/package"
+    assert capsys.readouterr().err == (
+        f"track_msgs/msg/Track.data has number 5 in {package}/.rosidl-proto.json, but there is no {lock_file}, and a "
+        f"new one has 2 for it; restore {lock_file} from version control; or, if nothing is left that was serialized "
+        f"with the old numbers, give --renumber, or remove {package} and generate it again\n"
+    )
+    assert not lock_file.exists()
+
+
+def test_a_folder_that_cannot_be_written(
+    build: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "build/depfile").mkdir(parents=True)
+
+    assert run("generate", build) == 1
+    assert capsys.readouterr().err == (
+        f"cannot write to {folder}/build: Is a directory ({folder}/build/depfile)\n"
+    )
+
+
 @pytest.mark.parametrize(
     ("command", "text", "error"),
     [

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import tempfile
 import venv
 from pathlib import Path
 
 import pytest
 
+from rosidl_adapter_proto.errors import GenerateError
 from tests.folders import content
 from tests.programs import run
 
@@ -110,4 +112,18 @@ def test_what_is_wrong_stops_the_build(name: str, wheel: Path, tmp_path: Path) -
 
     assert f"{project.definition.resolve()}:2:7: '3d' is not a valid field name" in error.replace(
         str(project.folder / ".."), str(project.folder.parent)
+    )
+
+
+def test_no_temporary_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    hatch = pytest.importorskip("rosidl_adapter_proto.hooks.hatch", reason="needs hatchling")
+    (folder / "pyproject.toml").write_text('[tool.rosidl-proto]\npackages = ["builtin_interfaces"]\n')
+    hook = hatch.RosidlProtoBuildHook(str(folder), {}, None, None, str(folder / "dist"), "wheel")
+    monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
+
+    with pytest.raises(GenerateError) as error:
+        hook.initialize("standard", {})
+
+    assert str(error.value) == (
+        "cannot make a temporary folder: No such file or directory; set TMPDIR to another folder"
     )
