@@ -323,3 +323,11 @@ def test_every_interface_there_is(origin: str, left_to_black: list[str]) -> None
         for numbering in (HashNumbering(), SequentialNumbering.from_lock("", None)):
             check_stable(modules(source, names, numbering))
     assert not left_to_black
+
+
+def test_what_the_layout_does_not_know_is_left_to_black(left_to_black: list[str]) -> None:
+    name = TypeName("a_msgs", "msg", "Constants")
+    texts = modules(text_source({name: f"uint8 {'A' * LINE_LENGTH}=1\nuint8 B=2\n"}), [name], HashNumbering())
+    check_stable(texts)
+    (left,) = left_to_black
+    assert left != texts["rosidl_proto/a_msgs/msg/Constants_adapter.py"] == formatted(left)
