@@ -6,12 +6,7 @@ these rows. A new file for each interface is a function, its template, and a row
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.generate.settings import Options
@@ -61,9 +56,9 @@ def all_files(generation: Generation, progress: Progress | None = None) -> dict[
     """Return the content of every file that a run makes, by path in the output folder."""
     outputs = _wanted(generation.options)
     made: list[dict[str, bytes]] = [{} for _ in outputs]
-    for done, of_interface in enumerate(_interface_files(generation), 1):
-        for files, more in zip(made, of_interface, strict=True):
-            files.update(more)
+    for done, file in enumerate(generation.files, 1):
+        for files, each in zip(made, outputs, strict=True):
+            files.update(each.interface_files(generation, file))
         if progress:
             progress(done, len(generation.files))
     content: dict[str, bytes] = {}
@@ -73,45 +68,6 @@ def all_files(generation: Generation, progress: Progress | None = None) -> dict[
     shared_folders = {each.folder: each.place for each in outputs if each.place is not None}
     content["pyproject.toml"] = project.project_file(generation, shared_folders)
     return content
-
-
-def _interface_files(generation: Generation) -> Iterator[list[Files]]:
-    """Yield the files of each interface, those of each output for themselves."""
-    numbers = range(len(generation.files))
-    # Formatting Python takes nearly all the time. Forking is only safe while there is one thread.
-    workers = os.cpu_count() or 1
-    if (
-        len(numbers) < _WORTH_FORKING
-        or workers == 1
-        or threading.active_count() > 1
-        or not hasattr(os, "fork")
-    ):
-        yield from (_files_of(generation, number) for number in numbers)
-        return
-    fork = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(workers, fork, _start_worker, (generation,)) as pool:
-        yield from pool.map(_files_of_worker, numbers, chunksize=4)
-
-
-_WORTH_FORKING = 16
-
-
-def _files_of(generation: Generation, number: int) -> list[Files]:
-    file = generation.files[number]
-    return [each.interface_files(generation, file) for each in _wanted(generation.options)]
-
-
-_of_worker: list[Generation] = []
-"""What a worker generates. It has it from its parent, without copying what is large."""
-
-
-def _start_worker(generation: Generation) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # interrupts are for the parent
-    _of_worker.append(generation)
-
-
-def _files_of_worker(number: int) -> list[Files]:
-    return _files_of(_of_worker[0], number)
 
 
 def _wanted(options: Options) -> list[Output]:

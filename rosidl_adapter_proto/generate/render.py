@@ -5,7 +5,6 @@ They are imported when they are first needed: they are slow to import, and a run
 
 from __future__ import annotations
 
-import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,30 +25,6 @@ def templates_folder() -> Path:
     raise GenerateError(f"the templates are missing from {package}; install rosidl-adapter-proto again")
 
 
-# Black has nothing to do for what is laid out as it does, and then takes half the time.
-
-
-def import_from(module: str, name: str, indent: str = "") -> str:
-    """Return an import as black lays it out."""
-    line = f"{indent}from {module} import {name}"
-    if len(line) <= _LINE_LENGTH:
-        return line
-    return f"{indent}from {module} import (\n{indent}    {name},\n{indent})"
-
-
-def wrapped(line: str, indent: str = "") -> str:
-    """Return a line as black lays it out: if it is long, what is in its parentheses gets a line of its own."""
-    if len(indent + line) <= _LINE_LENGTH or "(" not in line or ")" not in line:
-        return indent + line
-    head, _, rest = line.partition("(")
-    inner, _, tail = rest.rpartition(")")
-    return f"{indent}{head}(\n{indent}    {inner}\n{indent}){tail}"
-
-
-_LINE_LENGTH = 88
-"""That of black."""
-
-
 @cache
 def _environment() -> jinja2.Environment:
     import jinja2
@@ -62,7 +37,6 @@ def _environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.globals.update(import_from=import_from, wrapped=wrapped)
     return environment
 
 
@@ -71,12 +45,8 @@ def render(template: str, **values: Any) -> str:
     return _environment().get_template(template).render(**values)
 
 
-def render_python(template: str, *, stub: bool = False, **values: Any) -> str:
-    """Render a template to Python that is formatted as black does by default."""
+def format_python(text: str, *, stub: bool = False) -> str:
+    """Format Python as black does by default, which takes long."""
     import black
 
-    text = _TRAILING_SPACE.sub("", render(template, **values))
     return black.format_str(text, mode=black.Mode(is_pyi=stub))
-
-
-_TRAILING_SPACE = re.compile(r"[ \t]+$", re.MULTILINE)

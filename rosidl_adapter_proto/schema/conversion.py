@@ -183,9 +183,10 @@ class MessageConversion:
 def message_conversion(message: ProtoMessage) -> MessageConversion:
     """Decide how a message is converted."""
     packed_numbers = _packed_numbers(message)
+    packed_indices = {number: index for index, number in enumerate(packed_numbers)}
     return MessageConversion(
         tuple(
-            (each, _field_conversion(each, packed_numbers))
+            (each, _field_conversion(each, packed_indices))
             for each in message.fields
             if each.name != EMPTY_STRUCT_FIELD
         ),
@@ -210,7 +211,7 @@ def _packed_numbers(message: ProtoMessage) -> tuple[int, ...]:
     )
 
 
-def _field_conversion(field: ProtoField, packed_numbers: tuple[int, ...]) -> FieldConversion:
+def _field_conversion(field: ProtoField, packed_indices: Mapping[int, int]) -> FieldConversion:
     element = field.element
     if field.shape is Shape.SINGLE:
         if isinstance(element, TypeName):
@@ -221,7 +222,7 @@ def _field_conversion(field: ProtoField, packed_numbers: tuple[int, ...]) -> Fie
     if isinstance(element, TypeName):
         return Messages(element, length, size)
     if element.typecode:
-        index = packed_numbers.index(field.number) if field.number in packed_numbers else None
+        index = packed_indices.get(field.number)
         return Numbers(
             element.typecode, CARRIERS[field.type], length, size, index, has_default=bool(field.default)
         )

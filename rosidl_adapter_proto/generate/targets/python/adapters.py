@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from rosidl_adapter_proto.adapter.contract import constant_name
 from rosidl_adapter_proto.generate.targets.python.comments import docstring_lines
 from rosidl_adapter_proto.generate.targets.python.conversions import Lines, Writer, method
+from rosidl_adapter_proto.generate.targets.python.layout import quoted
 from rosidl_adapter_proto.generate.targets.python.names import Names
 from rosidl_adapter_proto.interfaces.model import Interface, TypeName
 from rosidl_adapter_proto.schema.conversion import NAMED_PARTS, has_defaults, message_conversion, ros_class
-from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoValue, plain_lines
+from rosidl_adapter_proto.schema.proto import ProtoField, ProtoMessage, ProtoScalarValue, plain_lines
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class AdapterField:
 
     Attributes:
         name: Its name.
-        info: The arguments of its `FieldInfo` after the name, as Python text.
+        info: Its `FieldInfo`, as Python text.
         to_custom: The lines that convert it to protobuf.
         to_ros: The lines that convert it to ROS.
     """
@@ -60,8 +61,18 @@ class MessageAdapter:
     packed_numbers: tuple[int, ...]
     fields: tuple[AdapterField, ...]
     set_in_parent: str
-    defaults: str
+    defaults: tuple[tuple[str, str | tuple[str, ...]], ...]
     has_defaults: bool
+
+    @property
+    def summary(self) -> str:
+        """The first line of its docstring."""
+        return f"Converts between protobuf {self.custom_full_name} and ROS {self.type_name}."
+
+    @property
+    def infos(self) -> tuple[str, ...]:
+        """What the adapter tells of each field."""
+        return tuple(each.info for each in self.fields)
 
     @property
     def converted(self) -> tuple[AdapterField, ...]:
@@ -106,7 +117,7 @@ def message_adapter(
         type_name=str(proto.type_name),
         type_hash=names.catalog.hash(proto.type_name),
         ros_class=ros_class(proto.type_name, interface),
-        comment=docstring_lines(proto.source.comment),
+        comment=("", *comment) if (comment := docstring_lines(proto.source.comment)) else (),
         constants=tuple(
             AdapterConstant(
                 constant_name(each.name, proto.name), _literal(each.value), tuple(plain_lines(each.comment))
@@ -125,13 +136,12 @@ def message_adapter(
 
 
 def _field_info(field: ProtoField, adapter_names: Mapping[TypeName, str]) -> str:
-    """Return the arguments of a `FieldInfo` behind the name, without those that have their defaults."""
-    arguments = [field.type_id, field.capacity or 0, field.string_bound or 0]
-    if isinstance(field.element, TypeName):
-        return ", ".join([*map(str, arguments), adapter_names[field.element]])
-    while arguments[-1] == 0:
-        arguments.pop()
-    return ", ".join(map(str, arguments))
+    """Return the `FieldInfo` of a field, without the arguments that have their defaults."""
+    numbers = [field.type_id, field.capacity or 0, field.string_bound or 0]
+    nested = [adapter_names[field.element]] if isinstance(field.element, TypeName) else []
+    while not nested and numbers[-1] == 0:
+        numbers.pop()
+    return f"adapter.FieldInfo({', '.join([quoted(field.name), *map(str, numbers), *nested])})"
 
 
 def group_adapter(
@@ -152,15 +162,21 @@ def group_adapter(
     )
 
 
-def _defaults(proto: ProtoMessage) -> str:
-    """Return the default values of a message as the Python text of a dictionary, in terms of protobuf."""
-    items = [f"{each.name!r}: {_literal(each.default)}" for each in proto.fields if each.default is not None]
-    return "{" + ", ".join(items) + "}" if items else ""
+def _defaults(proto: ProtoMessage) -> tuple[tuple[str, str | tuple[str, ...]], ...]:
+    """Return the default values of a message, in terms of protobuf, as literals and lists of literals by name."""
+    return tuple(
+        (
+            quoted(each.name),
+            tuple(map(_literal, each.default)) if isinstance(each.default, tuple) else _literal(each.default),
+        )
+        for each in proto.fields
+        if each.default is not None
+    )
 
 
-def _literal(value: ProtoValue) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_literal, value)) + "]"
+def _literal(value: ProtoScalarValue) -> str:
+    if isinstance(value, (str, bytes)):
+        return quoted(value)
     if isinstance(value, float) and not math.isfinite(value):
         return f'float("{value}")'
-    return repr(value)
+    return repr(value).replace("e+", "e")  # as black writes 1e+16

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from rosidl_adapter_proto import adapter
 from rosidl_adapter_proto.adapter.contract import is_plain_field
+from rosidl_adapter_proto.generate.targets.python.layout import quoted
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.schema.conversion import (
     Carrier,
@@ -81,7 +82,7 @@ class Writer:
     def _numbers(self, message: ProtoMessage, field: ProtoField, conversion: Numbers) -> tuple[Lines, Lines]:
         source, target = _read("source", field), _read("message", field)
         checked = self._after(conversion.length.to_custom, source)
-        values = self._call(adapter.numbers, checked, _quoted(conversion.typecode))
+        values = self._call(adapter.numbers, checked, quoted(conversion.typecode))
         match conversion.carrier:
             case Carrier.BYTES:
                 to_custom = _assign(field, f"{values}.tobytes()")
@@ -99,7 +100,7 @@ class Writer:
 
     def _array(self, source: str, conversion: Numbers) -> str:
         """Return the numbers of a protobuf message as an array."""
-        typecode = _quoted(conversion.typecode)
+        typecode = quoted(conversion.typecode)
         if conversion.packed_index is not None:
             return self._call(adapter.array_of, self._packed_field(conversion.packed_index), typecode)
         if conversion.carrier is Carrier.BYTES:
@@ -164,12 +165,10 @@ def _or_zeros(values: str, conversion: Compact | Values) -> str:
     """Return the values of a field that ROS has in Python; of an array that protobuf has not, zeros."""
     if conversion.size is None:
         return values
-    zero = repr(conversion.zero).replace(r"\x00", r"\0")
+    zero = conversion.zero
+    if isinstance(zero, (str, bytes)):
+        zero = quoted(zero).replace(r"\x00", r"\0")
     return f"{values} or [{zero}] * {conversion.size}"
-
-
-def _quoted(text: str) -> str:
-    return f'"{text}"'
 
 
 def _read(owner: str, field: ProtoField) -> str:
