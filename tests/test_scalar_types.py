@@ -65,12 +65,18 @@ def elements(row: Scalar) -> Iterator[tuple[BasicType | StringType, str]]:
         yield BasicType(row.name), ""
 
 
+def unbounded(element: BasicType | StringType) -> SequenceType:
+    """Return a sequence without a bound; ROS 2's parser takes that of wide strings for one."""
+    bound = element.bound if isinstance(element, StringType) and element.wide else None
+    return SequenceType(element, bound)
+
+
 def msg_spellings(row: Scalar) -> Iterator[tuple[FieldType, str]]:
     for element, bound in elements(row):
         for name in (f"{each}{bound}" for each in row.msg):
             yield element, f"{name} a"
             yield ArrayType(element, 3), f"{name}[3] a"
-            yield SequenceType(element), f"{name}[] a"
+            yield unbounded(element), f"{name}[] a"
             yield SequenceType(element, 3), f"{name}[<=3] a"
 
 
@@ -79,7 +85,7 @@ def idl_spellings(row: Scalar) -> Iterator[tuple[FieldType, str]]:
         for name in (f"{each}{bound and '<4>'}" for each in (row.name, *row.idl)):
             yield element, f"{name} a;"
             yield ArrayType(element, 3), f"{name} a[3];"
-            yield SequenceType(element), f"sequence<{name}> a;"
+            yield unbounded(element), f"sequence<{name}> a;"
             yield SequenceType(element, 3), f"sequence<{name}, 3> a;"
 
 

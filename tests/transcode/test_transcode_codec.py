@@ -189,24 +189,26 @@ def test_one_field_of_a_large_message_keeps_the_interpreter_lock() -> None:
     large: Any = protobuf_class(types, "test/msg/Large")
     codec = Codec(describe(types, "test/msg/Large"), large)
     cdr = codec.to_cdr(large(first=1, data=bytes(1 << 20), last=2))
-    begin, ran = threading.Event(), threading.Event()
+    assert codec.from_cdr(cdr, ["first"]).first == 1
+    done: list[Any] = []
+    seen: list[int] = []
 
     def other() -> None:
-        begin.wait()
-        ran.set()
+        while not done:
+            pass
+        seen.append(len(done))
 
     thread = threading.Thread(target=other)
-    thread.start()
     interval = sys.getswitchinterval()
-    sys.setswitchinterval(1000.0)
+    sys.setswitchinterval(1e-5)
     try:
-        begin.set()
-        for _ in range(1000):
-            assert codec.from_cdr(cdr, ["first"]).first == 1
-        assert not ran.is_set()
+        thread.start()
+        # No Python code runs in here, at which the other thread could get its turn.
+        done.extend(map(codec.from_cdr, itertools.repeat(cdr, 10_000), itertools.repeat(["first"])))
+        thread.join()
     finally:
         sys.setswitchinterval(interval)
-    thread.join()
+    assert seen == [10_000]
     assert codec.from_cdr(cdr, fields=["last"]) == large(last=2)
     assert codec.from_cdr(cdr, fields=["data"]) == large(data=bytes(1 << 20))
     with pytest.raises(TranscodeError, match=r"^test/msg/Large\.last at byte 1048588: 4 bytes are needed"):
