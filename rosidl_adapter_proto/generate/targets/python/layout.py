@@ -62,9 +62,8 @@ class Layout:
         line, head, inner = f"{indent}{target} = {value}", f"{indent}{target} = (", f"{indent}    {value}"
         if _fits(line) or not (_is_string(value) and value.isascii() and _fits(head)):
             return line
-        if (
-            not _fits(inner) and ":" not in target
-        ):  # black has brackets around annotations, and then splits anyway
+        # Black splits a line for nothing only behind an annotation.
+        if not _fits(inner) and ":" not in target:
             return self.settled(line)
         return "\n".join((head, self.settled(inner), f"{indent})"))
 
