@@ -7,6 +7,7 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
+from math import isinf
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +17,7 @@ import pytest
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto
 
 from rosidl_adapter_proto import TypeRegistry, adapter_for
-from rosidl_adapter_proto.errors import SchemaError
+from rosidl_adapter_proto.errors import ConversionError, SchemaError
 from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.description import described_type, field_type_description
@@ -47,13 +48,26 @@ NAME = TypeName("pkg", "msg", "Foo")
 EXTREMES: Mapping[Family, Callable[[Scalar], tuple[ScalarValue, ScalarValue]]] = {
     Family.BOOLEAN: lambda row: (False, True),
     Family.INTEGER: lambda row: row.range,
-    Family.FLOATING_POINT: lambda row: (-1.5, 2.0**127),
+    Family.FLOATING_POINT: lambda row: (-row.largest_float, row.largest_float),
     Family.OCTET: lambda row: row.range,
     Family.CHARACTER: lambda row: (0, row.largest_character),
     Family.STRING: lambda row: ("", "a\N{GRINNING FACE}"),
     Family.WSTRING: lambda row: ("", "a\N{GRINNING FACE}"),
 }
 """Two values of each type, the smallest and the largest where there are such."""
+
+REFUSED: Mapping[Family, Callable[[Scalar], tuple[ScalarValue, ...]]] = {
+    Family.BOOLEAN: lambda row: (-1, 2),
+    Family.INTEGER: lambda row: (row.range[0] - 1, row.range[1] + 1),
+    Family.FLOATING_POINT: lambda row: (
+        () if isinf(row.smallest_infinite) else (-row.smallest_infinite, row.smallest_infinite)
+    ),
+    Family.OCTET: lambda row: (row.range[0] - 1, row.range[1] + 1),
+    Family.CHARACTER: lambda row: (row.largest_character + 1,),
+    Family.STRING: lambda row: (),
+    Family.WSTRING: lambda row: (),
+}
+"""The values next to the extremes that a type does not have; what strings refuse, their own tests say."""
 
 
 def elements(row: Scalar) -> Iterator[tuple[BasicType | StringType, str]]:
@@ -104,7 +118,7 @@ def proto_field(field: Field) -> ProtoField:
 
 
 def test_there_are_values_of_every_family() -> None:
-    assert EXTREMES.keys() == set(Family)
+    assert EXTREMES.keys() == REFUSED.keys() == set(Family)
 
 
 @pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
@@ -146,7 +160,27 @@ def test_from_definitions_to_cdr(row: Scalar, tmp_path: Path, monkeypatch: pytes
     It does so in every form of a field, under every name that a definition may use, in `.msg` and in `.idl`, and with
     adapters that are generated and ones that are made at run time.
     """
-    package = f"scalars_{row.name.replace(' ', '_')}"
+    for fields, adapter in adapters_of(row, "scalars", tmp_path, monkeypatch):
+        for value in EXTREMES[row.family](row):
+            check_there_and_back(adapter, row, fields, value)
+
+
+@pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
+def test_values_that_a_type_does_not_have(
+    row: Scalar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first ones outside are errors from ROS, and from protobuf wherever a message can hold them."""
+    for fields, adapter in adapters_of(row, "refused", tmp_path, monkeypatch):
+        for field in fields:
+            held = [check_refused(adapter, row, fields, field, value) for value in REFUSED[row.family](row)]
+            assert not is_single(field) or any(held) == (proto_field(field).limits is not None)
+
+
+def adapters_of(
+    row: Scalar, prefix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[tuple[list[Field], Any]]:
+    """Yield adapters of messages that have a row in every form and under every name, with their fields."""
+    package = f"{prefix}_{row.name.replace(' ', '_')}"
     of_idl, members = named_fields(idl_spellings(row))
     of_msg, lines = named_fields(msg_spellings(row))
     definitions = {
@@ -164,8 +198,7 @@ def test_from_definitions_to_cdr(row: Scalar, tmp_path: Path, monkeypatch: pytes
         assert len({each.custom_type for each in adapters}) == 1
         for adapter in adapters:
             adapter.ros_message_type = partial(ros_message, fields)
-            for value in EXTREMES[row.family](row):
-                check_there_and_back(adapter, row, fields, value)
+            yield fields, adapter
 
 
 def named_fields(spellings: Iterator[tuple[FieldType, str]]) -> tuple[list[Field], list[str]]:
@@ -201,6 +234,63 @@ def check_there_and_back(adapter: Any, row: Scalar, fields: list[Field], value: 
         assert adapter.from_cdr(adapter.to_cdr(message)) == message
 
 
+def check_refused(adapter: Any, row: Scalar, fields: list[Field], field: Field, value: ScalarValue) -> bool:
+    """Put a value that is refused into a field, between two others if there can be several.
+
+    Returns:
+        Whether a protobuf message can hold it.
+    """
+    good = EXTREMES[row.family](row)[0]
+    values = value if is_single(field) else (good, value, good)
+    paths = {field.name} if is_single(field) else {field.name, f"{field.name}[1]"}
+
+    message = ros_message(fields)
+    for each in fields:
+        setattr(message, each.name, ros_values(row, good if is_single(each) else (good,) * 3))
+    assert adapter.convert_to_custom(message)  # so that it is the value that is refused
+    setattr(message, field.name, ros_values(row, values))
+    with pytest.raises(ConversionError) as error:
+        adapter.convert_to_custom(message)
+    assert error.value.field_path in paths
+
+    message = custom_message(adapter, field, values)
+    if message is None:
+        return False
+    with pytest.raises(ConversionError) as error:
+        adapter.convert_to_ros_message(message)
+    assert error.value.field_path in paths
+    if row.cdr is not None:
+        with pytest.raises(ConversionError) as error:
+            adapter.to_cdr(message)
+        assert error.value.field_path in paths
+        if not isinstance(getattr(message, field.name), str):
+            assert "from {:.17g} to {:.17g}".format(*EXTREMES[row.family](row)) in error.value.reason
+    return True
+
+
+def ros_values(row: Scalar, values: Any) -> Any:
+    """Return a value, or several, as ROS has them."""
+    if isinstance(values, tuple):
+        return [ros_values(row, each) for each in values]
+    return chr(values) if row.family is Family.CHARACTER else values
+
+
+def custom_message(adapter: Any, field: Field, values: Any) -> Any:
+    """Return a protobuf message with a value, or several, in a field; None if protobuf cannot hold them."""
+    proto = proto_field(field)
+    value = values
+    try:
+        if isinstance(values, tuple) and not proto.repeated:
+            value = bytes(values) if proto.type == "bytes" else "".join(map(chr, values))
+        message = adapter.custom_type(**{field.name: value})
+    except ValueError:
+        return None
+    found = getattr(message, field.name)
+    if isinstance(found, str):
+        found = memoryview(found.encode("utf-16-le")).cast("H")  # what ROS counts: above 0xFFFF, a pair
+    return message if (tuple(found) if isinstance(values, tuple) else found) == values else None
+
+
 def is_single(field: Field) -> bool:
     return type_parts(field.type).shape is Shape.SINGLE
 
@@ -220,7 +310,6 @@ def ros_message(fields: list[Field]) -> SimpleNamespace:
 
 @pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
 def test_limits(row: Scalar) -> None:
-    """Numbers that protobuf has and ROS has not are outside the limits."""
+    """They are the extremes, where there are any: where protobuf has more, see `check_refused`."""
     limits = proto_field(Field("a", BasicType(row.name) if not row.is_string else StringType())).limits
-    narrow = {"octet", "char", "wchar", "int8", "uint8", "int16", "uint16"}
-    assert limits == (EXTREMES[row.family](row) if row.name in narrow else None)
+    assert limits == (EXTREMES[row.family](row) if limits and REFUSED[row.family](row) else None)

@@ -17,45 +17,58 @@ from pathlib import Path
 from typing import Any
 
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import Message
 
 from rosidl_adapter_proto.interfaces.description import TypeDescription
+from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, SCALARS, CdrForm
 from rosidl_adapter_proto.transcode import Transcoder
 
 Types = dict[str, dict[str, Any]]
 Value = dict[str, Any]
 
-INTEGERS = {
-    "int8": "b",
-    "uint8": "B",
-    "octet": "B",
-    "char": "B",
-    "int16": "h",
-    "uint16": "H",
-    "wchar": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-}
-FLOATS = {"float": "f", "double": "d"}
-NUMBER_FORMATS = {**INTEGERS, **FLOATS, "boolean": "?"}
+ROWS = {name: row for name, row in SCALARS.items() if row.cdr is not None}
+"""Every scalar type that has a form in CDR."""
 
-_NAMES = (
-    *("nested", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64", "float", "double"),
-    *("long double", "char", "wchar", "boolean", "octet", "string", "wstring"),
-)
-TYPE_IDS = {name: number for number, name in enumerate(_NAMES, start=1)}
-ELEMENT_NAMES = {**{number: name for name, number in TYPE_IDS.items()}, 21: "string", 22: "wstring"}
+_FORMATS = {
+    CdrForm.BOOLEAN: "?",
+    CdrForm.UINT8: "B",
+    CdrForm.INT8: "b",
+    CdrForm.CHAR: "B",
+    CdrForm.UINT16: "H",
+    CdrForm.INT16: "h",
+    CdrForm.WCHAR: "H",
+    CdrForm.UINT32: "I",
+    CdrForm.INT32: "i",
+    CdrForm.FLOAT: "f",
+    CdrForm.UINT64: "Q",
+    CdrForm.INT64: "q",
+    CdrForm.DOUBLE: "d",
+}
+"""What `struct` calls each form of numbers."""
+
+NUMBER_FORMATS = {name: _FORMATS[row.cdr] for name, row in ROWS.items() if row.cdr and not row.is_string}
+INTEGERS = {name: each for name, each in NUMBER_FORMATS.items() if ROWS[name].bits}
+FLOATS = {name: each for name, each in NUMBER_FORMATS.items() if ROWS[name].largest_float}
+
+TYPE_IDS = {"nested": NESTED_TYPE_ID, **{name: row.type_id for name, row in SCALARS.items()}}
+BOUNDED_TYPE_IDS = {
+    name: row.bounded_type_id for name, row in SCALARS.items() if row.bounded_type_id is not None
+}
+ELEMENT_NAMES = {number: name for ids in (TYPE_IDS, BOUNDED_TYPE_IDS) for name, number in ids.items()}
+
+
+def _protobuf_type(name: str) -> Any:
+    return getattr(FieldDescriptor, f"TYPE_{name.upper()}")
+
 
 SINGLE = {
-    **{"int8": 5, "int16": 5, "uint8": 13, "octet": 13, "char": 13, "wchar": 13, "uint16": 13},
-    **{"int32": 15, "uint32": 7, "int64": 16, "uint64": 6, "float": 2, "double": 1},
-    **{"boolean": 8, "string": 9, "wstring": 12, "nested": 11},
+    "nested": FieldDescriptor.TYPE_MESSAGE,
+    **{name: _protobuf_type(row.protobuf) for name, row in ROWS.items()},
 }
 """The protobuf type of each IDL type, as numbers of `FieldDescriptorProto.Type`."""
 
-TEXT_OR_BYTES = {"int8": 12, "uint8": 12, "octet": 12, "char": 9, "wchar": 9}
+TEXT_OR_BYTES = {name: _protobuf_type(row.many) for name, row in ROWS.items() if not row.repeated}
 """Those whose arrays and sequences are one protobuf field that is not repeated."""
 
 
@@ -122,7 +135,7 @@ def struct_type(name: str, /, **fields: str) -> Types:
         if element.endswith(">"):
             element, _, bound_text = element[:-1].partition("<")
             bound = int(bound_text)
-        type_id = {"string": 21, "wstring": 22}[element] if bound else TYPE_IDS.get(element, 1)
+        type_id = BOUNDED_TYPE_IDS[element] if bound else TYPE_IDS.get(element, 1)
         described.append(
             {
                 "name": field,
@@ -235,8 +248,9 @@ def _random_element(types: Types, field: dict[str, Any], rng: random.Random, rep
     if element == "boolean":
         return rng.random() < 0.5
     if element in FLOATS:
-        value = rng.choice((-0.0, float("inf"), float("-inf"), rng.uniform(-1e6, 1e6), rng.random()))
-        return struct.unpack("f", struct.pack("f", value))[0] if element == "float" else value
+        largest = min(ROWS[element].largest_float, 1e6)
+        value = rng.choice((-0.0, float("inf"), float("-inf"), rng.uniform(-largest, largest), rng.random()))
+        return struct.unpack(FLOATS[element], struct.pack(FLOATS[element], value))[0]
     if element == "char" or (element == "wchar" and repeated):
         return rng.choice((0x20, 0x41, 0x7F))
     bits = struct.calcsize(INTEGERS[element]) * 8
@@ -328,25 +342,9 @@ def fields_of(types: Types, name: str) -> Iterator[tuple[str, str, str]]:
 
 def nasty_types() -> Types:
     """Return types with every kind of field that there is, `test/msg/Nasty` and its parts."""
-    elements = (
-        "boolean",
-        "octet",
-        "char",
-        "wchar",
-        "uint8",
-        "int8",
-        "uint16",
-        "int16",
-        "uint32",
-        "int32",
-        "float",
-        "uint64",
-        "int64",
-        "double",
-    )
     fields: dict[str, str] = {}
     for element in (
-        *elements,
+        *NUMBER_FORMATS,
         "string",
         "wstring",
         "string<3>",

@@ -1,10 +1,12 @@
 #include "rosidl_adapter_proto/error.hpp"
 
+#include "text.hpp"
+
 namespace rosidl_proto {
 namespace {
 
-// {a} and {b} are numbers of the error, {s} is `a` as a signed number, {e} is `a` as the name of an
-// encapsulation, {r} is the range of the form `b` and {v} are its values in CDR.
+// {a} and {b} are numbers of the error, {e} is `a` as the name of an encapsulation, {n} is the number that
+// `a` is on the wire for the form `b`, {r} is the range of that form and {v} are its values in CDR.
 const char* text_of(Reason reason) {
   switch (reason) {
     case Reason::None:
@@ -49,7 +51,7 @@ const char* text_of(Reason reason) {
     case Reason::ArrayLength:
       return "the array has {a} elements; give {b}, or none for zeros";
     case Reason::Range:
-      return "{s} does not fit {r}";
+      return "{n} does not fit {r}";
     case Reason::NulInString:
       return "the string contains NUL, which ends a string in ROS; remove it";
     case Reason::OddWstring:
@@ -100,6 +102,28 @@ std::string encapsulation(uint64_t id) {
   return "unknown (" + number + ")";
 }
 
+std::string refused_number(CdrForm cdr, uint64_t value) {
+  return visit(cdr, [value](auto form) -> std::string {
+    using F = decltype(form);
+    if constexpr (kRefuses<F>) {
+      return number_text(F::number(value));
+    } else {
+      return "";
+    }
+  });
+}
+
+const char* range(CdrForm cdr) {
+  return visit(cdr, [](auto form) {
+    using F = decltype(form);
+    if constexpr (kRefuses<F>) {
+      return F::kRange;
+    } else {
+      return "";
+    }
+  });
+}
+
 }  // namespace
 
 std::string field_path(const Error& error, const Plan& plan) {
@@ -126,11 +150,11 @@ std::string reason(const Error& error) {
       case 'b':
         text += std::to_string(error.b);
         break;
-      case 's':
-        text += std::to_string(static_cast<int64_t>(error.a));
+      case 'n':
+        text += refused_number(static_cast<CdrForm>(error.b), error.a);
         break;
       case 'r':
-        text += visit(static_cast<CdrForm>(error.b), [](auto form) { return decltype(form)::kRange; });
+        text += range(static_cast<CdrForm>(error.b));
         break;
       case 'v':
         text += visit(static_cast<CdrForm>(error.b), [](auto form) { return decltype(form)::kValues; });

@@ -55,9 +55,8 @@ class ProtobufNumbers {
       const auto put = [&](uint64_t value, const uint8_t* p) {
         if (index == found_) return input_.fail(Reason::Changed, p);
         Raw raw{};
-        int64_t refused = 0;
-        if (!F::from_wire(value, &raw, &refused)) {
-          input_.fail(Reason::Range, p, static_cast<uint64_t>(refused), static_cast<uint64_t>(field_.op.cdr));
+        if (!from_wire<F>(value, &raw)) {
+          input_.fail(Reason::Range, p, value, static_cast<uint64_t>(field_.op.cdr));
           input_.at_element(static_cast<int64_t>(index));
           return false;
         }
@@ -210,10 +209,8 @@ class ProtobufReader {
       using F = decltype(form);
       if constexpr (F::kIsNumber) {
         typename F::Raw raw{};
-        int64_t refused = 0;
-        if (kContent && !F::from_wire(slot.value, &raw, &refused)) {
-          return fail(Reason::Range, slot.data, static_cast<uint64_t>(refused),
-                      static_cast<uint64_t>(field.op.cdr));
+        if (kContent && !from_wire<F>(slot.value, &raw)) {
+          return fail(Reason::Range, slot.data, slot.value, static_cast<uint64_t>(field.op.cdr));
         }
         return take(sink_.template number<F>(field.op, at, raw));
       } else if constexpr (F::kIsString) {
@@ -399,8 +396,7 @@ class ProtobufReader {
       using F = decltype(form);
       if constexpr (F::kIsNumber) {
         typename F::Raw raw{};
-        int64_t refused = 0;
-        if (!F::from_wire(value, &raw, &refused)) return false;
+        if (!from_wire<F>(value, &raw)) return false;
         store_little(out, raw);
         return true;
       } else if constexpr (F::kIsString) {

@@ -1,5 +1,7 @@
 #include "text.hpp"
 
+#include <cstdio>
+
 #include "rosidl_adapter_proto/wire.hpp"
 
 namespace rosidl_proto {
@@ -90,6 +92,14 @@ uint8_t* put_utf8(uint8_t* out, uint32_t code_point) {
   }
   *out++ = tail(0);
   return out;
+}
+
+std::string number_text(int64_t number) { return std::to_string(number); }
+
+std::string number_text(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", number);
+  return text;
 }
 
 }  // namespace rosidl_proto

@@ -1,7 +1,8 @@
-// UTF-8 and UTF-16 (The Unicode Standard, section 3.9).
+// UTF-8 and UTF-16 (The Unicode Standard, section 3.9), and numbers as errors show them.
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 namespace rosidl_proto {
 
@@ -55,5 +56,9 @@ inline unsigned utf8_size(uint32_t code_point) {
 
 // Writes `utf8_size(code_point)` bytes.
 uint8_t* put_utf8(uint8_t* out, uint32_t code_point);
+
+// Floating-point numbers with the digits that tell every float32 from the others.
+std::string number_text(int64_t number);
+std::string number_text(double number);
 
 }  // namespace rosidl_proto

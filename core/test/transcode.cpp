@@ -1,8 +1,11 @@
 // Both directions from C++: results, errors, and what Python cannot show.
 #include "rosidl_adapter_proto/transcode.hpp"
 
+#include <limits>
+
 #include "checks.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
+#include "text.hpp"
 
 namespace rosidl_proto::test {
 
@@ -89,6 +92,13 @@ TEST(errors_say_what_and_where) {
   CHECK_EQUAL(error,
               "header.stamp.nanosec at 8: 4 bytes are needed and 0 are left; the data is cut off or of "
               "another type");
+}
+
+TEST(numbers_in_errors_are_short_and_exact) {
+  CHECK_EQUAL(number_text(std::numeric_limits<int64_t>::min()), "-9223372036854775808");
+  CHECK_EQUAL(number_text(65520.0), "65520");
+  CHECK_EQUAL(number_text(-0.5), "-0.5");
+  CHECK_EQUAL(number_text(double{std::numeric_limits<float>::max()}), "3.40282347e+38");
 }
 
 TEST(groups_are_skipped) {

@@ -77,7 +77,7 @@ def _same(value: Any) -> Any:
     return value
 
 
-def _then(first: Convert, helper: Callable[..., Any], arguments: tuple[int, ...]) -> Convert:
+def _then(first: Convert, helper: Callable[..., Any], arguments: tuple[float, ...]) -> Convert:
     if first is _same:
         return helper if not arguments else lambda value: helper(value, *arguments)
     return lambda value: helper(first(value), *arguments)

@@ -7,8 +7,10 @@ whose list of CDR forms a test holds against this one. A new type is one row, an
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from enum import Enum, IntEnum
+from math import frexp
 
 
 class Family(Enum):
@@ -63,6 +65,7 @@ class Scalar:
         bits: Width of an integer, octet or character.
         signed: Whether it has values below zero.
         largest_character: Largest character that a message can have, as a number.
+        largest_float: Largest finite number of a floating-point type, as far as Python and protobuf have it.
         typecode: What `array.array` calls it, if ROS has its arrays as array.array (sequences) or numpy (arrays).
     """
 
@@ -80,6 +83,7 @@ class Scalar:
     bits: int = 0
     signed: bool = False
     largest_character: int = 0
+    largest_float: float = 0.0
     typecode: str | None = None
 
     @property
@@ -90,6 +94,18 @@ class Scalar:
         if self.signed:
             return -(1 << (self.bits - 1)), (1 << (self.bits - 1)) - 1
         return 0, self.largest_character or (1 << self.bits) - 1
+
+    @property
+    def smallest_infinite(self) -> float:
+        """The smallest number that is rounded to infinity (IEEE 754, section 4.3.1).
+
+        It is halfway to the next power of two; infinity itself if no other number is too large.
+        """
+        if not self.largest_float:
+            raise ValueError(f"{self.name} has no infinity")
+        _, exponent = frexp(self.largest_float)
+        half_of_next = 2.0 ** (exponent - 1)
+        return self.largest_float / 2 + half_of_next
 
     @property
     def is_string(self) -> bool:
@@ -191,6 +207,7 @@ _ROWS = (
         CdrForm.FLOAT,
         "float",
         msg=("float32",),
+        largest_float=3.4028234663852886e38,
         typecode="f",
     ),
     Scalar(
@@ -203,10 +220,21 @@ _ROWS = (
         CdrForm.DOUBLE,
         "double",
         msg=("float64",),
+        largest_float=sys.float_info.max,
         typecode="d",
     ),
     # Fast CDR copies the bytes of the machine: 80-bit x87 numbers on x86-64, 128-bit IEEE numbers on ARM.
-    Scalar("long double", Family.FLOATING_POINT, 12, "double", "double", True, None, "long double"),
+    Scalar(
+        "long double",
+        Family.FLOATING_POINT,
+        12,
+        "double",
+        "double",
+        True,
+        None,
+        "long double",
+        largest_float=sys.float_info.max,
+    ),
     Scalar(
         "string",
         Family.STRING,
@@ -239,3 +267,6 @@ SCALARS: dict[str, Scalar] = {row.name: row for row in _ROWS}
 
 NESTED_TYPE_ID = 1
 """The number of a nested message in a type description (REP-2011)."""
+
+RESERVED_TYPE_IDS = {19: "fixed string", 20: "fixed wstring"}
+"""Numbers that no row may have, since REP-2011 has them for types that no definition can spell."""

@@ -55,7 +55,7 @@ class Step:
     """What a value becomes next: what the helper returns for it and the arguments."""
 
     helper: Helper
-    arguments: tuple[int, ...] = ()
+    arguments: tuple[float, ...] = ()
 
 
 Steps = tuple[Step, ...]
@@ -261,7 +261,9 @@ def _integer(field: ProtoField) -> BothWays:
 
 
 def _floating_point(field: ProtoField) -> BothWays:
-    return BothWays((Step(Helper.FLOAT32),)) if field.type == "float" else BothWays()
+    assert isinstance(field.element, Scalar)  # a message is none
+    check = FLOAT_CHECKS[field.element.name]
+    return BothWays(check, check if field.limits else ())
 
 
 def _octet(field: ProtoField) -> BothWays:
@@ -297,6 +299,13 @@ VALUES: Mapping[Family, Callable[[ProtoField], BothWays]] = {
     Family.WSTRING: _wstring,
 }
 """How one value of each family is converted."""
+
+FLOAT_CHECKS: Mapping[str, Steps] = {
+    "float": (Step(Helper.FLOAT32),),
+    "double": (),
+    "long double": (),
+}
+"""What refuses numbers that are too large, for each floating-point type; every Python float is a double."""
 
 ZEROS: Mapping[Family, ScalarValue | bytes] = {
     Family.BOOLEAN: False,

@@ -24,7 +24,7 @@ from rosidl_adapter_proto.interfaces.model import (
     references,
     type_parts,
 )
-from rosidl_adapter_proto.interfaces.scalars import Family, Scalar
+from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
 from rosidl_adapter_proto.schema.numbering import Numbering
 from rosidl_adapter_proto.schema.typemap import (
     MAXIMUM_DEPTH,
@@ -74,7 +74,7 @@ class ProtoField:
     element: Scalar | TypeName
     capacity: int | None
     string_bound: int | None
-    limits: tuple[int, int] | None
+    limits: tuple[float, float] | None
     default: ProtoValue | None
     type_id: int
     source: Field
@@ -299,14 +299,16 @@ def _proto_field(field: Field, number: int) -> ProtoField:
     )
 
 
-def _limits(scalar: Scalar) -> tuple[int, int] | None:
+def _limits(scalar: Scalar) -> tuple[float, float] | None:
     if scalar.bits and scalar.bits < _PROTOBUF_INTEGER_BITS:
         return scalar.range
+    if scalar.largest_float and scalar.largest_float < SCALARS[scalar.protobuf].largest_float:
+        return -scalar.largest_float, scalar.largest_float
     return None
 
 
 _PROTOBUF_INTEGER_BITS = 32
-"""The width of the narrowest integers in protobuf."""
+"""The width of the narrowest integers in protobuf; its floating-point types are those of the same name in IDL."""
 
 
 def _proto_value(field_type: FieldType, value: Value) -> ProtoValue:

@@ -84,7 +84,10 @@ def test_every_version_that_is_served_has_its_golden_modules(fresh: Path) -> Non
 
 @pytest.mark.parametrize("version", SERVED_VERSIONS)
 def test_modules_of_every_version_convert_alike(version: int) -> None:
-    assert round_trip(CONTRACT / str(version)) == round_trip(CURRENT)
+    """What a version has; a message that a later version needs for a new helper is not in it."""
+    found = round_trip(CONTRACT / str(version)).splitlines()
+    has = {line.split()[0] for line in found}
+    assert [line for line in round_trip(CURRENT).splitlines() if line.split()[0] in has] == found
 
 
 def test_exactly_what_generated_modules_need_is_offered() -> None:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import array
+import math
+import struct
 from collections import Counter
 
 import pytest
@@ -8,7 +10,14 @@ import pytest
 from rosidl_adapter_proto.interfaces import msg
 from rosidl_adapter_proto.interfaces.idl import values
 from rosidl_adapter_proto.interfaces.model import BasicType, StringType
-from rosidl_adapter_proto.interfaces.scalars import NESTED_TYPE_ID, SCALARS, CdrForm, Family, Scalar
+from rosidl_adapter_proto.interfaces.scalars import (
+    NESTED_TYPE_ID,
+    RESERVED_TYPE_IDS,
+    SCALARS,
+    CdrForm,
+    Family,
+    Scalar,
+)
 
 ROWS = pytest.mark.parametrize("row", SCALARS.values(), ids=SCALARS)
 
@@ -22,7 +31,7 @@ def test_nothing_is_called_or_numbered_twice() -> None:
     rows = SCALARS.values()
     ids = [each for row in rows for each in (row.type_id, row.bounded_type_id) if each is not None]
     for names in (
-        [*ids, NESTED_TYPE_ID],
+        [*ids, NESTED_TYPE_ID, *RESERVED_TYPE_IDS],
         [name for row in rows for name in row.msg],
         [name for row in rows for name in (row.name, *row.idl)],
     ):
@@ -38,6 +47,7 @@ def test_a_row_agrees_with_itself(row: Scalar) -> None:
     has_bits = row.family in (Family.INTEGER, Family.OCTET, Family.CHARACTER)
     assert bool(row.bits) == has_bits
     assert bool(row.largest_character) == (row.family is Family.CHARACTER)
+    assert bool(row.largest_float) == (row.family is Family.FLOATING_POINT)
     assert row.is_string == (row.bounded_type_id is not None)
     assert not row.repeated or row.many == row.protobuf
     assert row.typecode is None or not row.bits or array.array(row.typecode).itemsize * 8 == row.bits
@@ -56,3 +66,16 @@ def test_a_row_agrees_with_itself(row: Scalar) -> None:
 def test_the_model_finds_its_row(row: Scalar) -> None:
     model = StringType(row.family is Family.WSTRING) if row.is_string else BasicType(row.name)
     assert model.scalar is row
+
+
+def test_the_smallest_infinite_numbers() -> None:
+    """What struct refuses (CPython rounds as IEEE 754 does) and the number below, which it takes."""
+    smallest = SCALARS["float"].smallest_infinite
+    with pytest.raises(OverflowError):
+        struct.pack("<f", smallest)
+    assert struct.unpack("<f", struct.pack("<f", math.nextafter(smallest, 0))) == (
+        SCALARS["float"].largest_float,
+    )
+    assert SCALARS["double"].smallest_infinite == math.inf
+    with pytest.raises(ValueError, match=r"^int8 has no infinity$"):
+        SCALARS["int8"].smallest_infinite  # noqa: B018

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
+from math import inf
 
 import pytest
 
@@ -23,6 +24,7 @@ from rosidl_adapter_proto.interfaces.scalars import SCALARS, Family, Scalar
 from rosidl_adapter_proto.schema.conversion import (
     CARRIERS,
     COMPACT_VALUES,
+    FLOAT_CHECKS,
     VALUES,
     ZEROS,
     BothWays,
@@ -100,6 +102,12 @@ def test_every_row_in_every_shape(row: Scalar, value: ValueType) -> None:
 )
 def test_one_value(element: str, expected: BothWays) -> None:
     assert convert_one(BasicType(element)) == OneValue(expected)
+
+
+def test_floats_that_python_has_and_ros_has_not_are_checked() -> None:
+    rows = [row for row in SCALARS.values() if row.family is Family.FLOATING_POINT]
+    assert list(FLOAT_CHECKS) == [row.name for row in rows]
+    assert [bool(FLOAT_CHECKS[row.name]) for row in rows] == [row.smallest_infinite < inf for row in rows]
 
 
 def test_strings() -> None:

@@ -107,7 +107,7 @@ WRONG: dict[str, tuple[Plan | bytes, str]] = {
     "an empty message": (plan(()), "the messages of the plan do not follow each other"),
     "number 0": (one_field(number=0), FORMS),
     "a large number": (one_field(number=2**29), "the plan has a field number out of range"),
-    "an unknown form": (one_field(cdr=17), "the plan has an unknown operation"),
+    "an unknown form": (one_field(cdr=max(CdrForm) + 1), "the plan has an unknown operation"),
     "no form": (one_field(cdr=0), "the plan has an unknown operation"),
     "another protobuf form": (one_field(protobuf=FieldDescriptor.TYPE_SFIXED32), FORMS),
     "an unknown protobuf form": (one_field(protobuf=200), FORMS),

@@ -113,24 +113,42 @@ struct NumberForm {
   static constexpr bool kIsOneValue = kIsText || many == ProtobufForm::Bytes;
 
   // What forms may have otherwise: the largest character, whether the bytes of an array are the same on the
-  // other side, whether all bits are a value in CDR, and the texts of errors.
+  // other side, whether all bits are a value in CDR, and the text of the error if they are not.
   static constexpr uint64_t kLargestCharacter = 0;
   static constexpr bool kCopiesToProtobuf = false, kCopiesToCdr = false;
   static constexpr bool kTakesAll = true;
   static constexpr bool is_value(Raw) { return true; }
   static constexpr const char* kValues = "";  // before " and this one is {number}"
-  static constexpr const char* kRange = "";   // after "{number} does not fit "
 };
+
+// A form whose `from_wire` takes every value in protobuf returns the bits in CDR: `Raw from_wire(uint64_t)`.
+// One that refuses some returns whether it took the value, `bool from_wire(uint64_t, Raw*)`, and has what the
+// error says: `number(uint64_t)`, an `int64_t` or a `double`, and `kRange`, after "{number} does not fit ".
+template <class F, class = void>
+constexpr bool kRefuses = false;
+template <class F>
+constexpr bool
+    kRefuses<F, std::void_t<decltype(F::from_wire(uint64_t{}, static_cast<typename F::Raw*>(nullptr)))>> =
+        true;
+
+// Makes the bits in CDR of a value in protobuf; false if they cannot hold it.
+template <class F>
+ROSIDL_PROTO_INLINE constexpr bool from_wire(uint64_t value, typename F::Raw* raw) {
+  if constexpr (kRefuses<F>) {
+    static_assert(F::kRange[0] != '\0', "a form that refuses values says in kRange which ones it takes");
+    return F::from_wire(value, raw);
+  } else {
+    *raw = F::from_wire(value);
+    return true;
+  }
+}
 
 // A number whose bits are the same in CDR and in protobuf.
 template <class Raw, ProtobufForm form>
 struct FixedForm : NumberForm<Raw, form, form> {
   static constexpr bool kCopiesToProtobuf = true, kCopiesToCdr = true;
   static constexpr uint64_t to_wire(Raw raw) { return raw; }
-  static constexpr bool from_wire(uint64_t value, Raw* raw, int64_t*) {
-    *raw = static_cast<Raw>(value);
-    return true;
-  }
+  static constexpr Raw from_wire(uint64_t value) { return static_cast<Raw>(value); }
 };
 
 // A number of 8 or 16 bits, which protobuf has as a varint: sign-extended to 64 bits, so that negative ones
@@ -145,16 +163,14 @@ struct SmallForm
   static constexpr uint64_t to_wire(Raw raw) {
     return static_cast<uint64_t>(static_cast<int64_t>(static_cast<T>(raw)));
   }
-  // Leaves a number that does not fit in `*refused`.
-  static constexpr bool from_wire(uint64_t value, Raw* raw, int64_t* refused) {
+  static constexpr int64_t number(uint64_t value) {
     const auto cut = static_cast<uint32_t>(value);
-    const int64_t number = std::is_signed<T>::value ? int64_t{static_cast<int32_t>(cut)} : int64_t{cut};
-    if (number < std::numeric_limits<T>::min() || number > std::numeric_limits<T>::max()) {
-      *refused = number;
-      return false;
-    }
-    *raw = static_cast<Raw>(number);
-    return true;
+    return std::is_signed<T>::value ? int64_t{static_cast<int32_t>(cut)} : int64_t{cut};
+  }
+  static constexpr bool from_wire(uint64_t value, Raw* raw) {
+    const int64_t found = number(value);
+    *raw = static_cast<Raw>(found);
+    return found >= std::numeric_limits<T>::min() && found <= std::numeric_limits<T>::max();
   }
 };
 
@@ -166,7 +182,7 @@ struct StringForm {
   static constexpr uint64_t kSize = 0, kMinimumSize = 4;  // in CDR
   static constexpr uint64_t kUnitSize = unit_size, kTerminator = terminator;
   static constexpr uint64_t kLargestCharacter = 0;
-  static constexpr const char *kValues = "", *kRange = "";
+  static constexpr const char* kValues = "";
 };
 
 template <CdrForm form>
@@ -182,10 +198,7 @@ struct Form<CdrForm::Boolean> : NumberForm<uint8_t, ProtobufForm::Bool, Protobuf
   static constexpr bool is_value(uint8_t raw) { return raw <= 1; }
   static constexpr const char* kValues = "a boolean is 0 or 1 in CDR";
   static constexpr uint64_t to_wire(uint8_t raw) { return raw; }
-  static constexpr bool from_wire(uint64_t value, uint8_t* raw, int64_t*) {
-    *raw = value != 0;
-    return true;
-  }
+  static constexpr uint8_t from_wire(uint64_t value) { return value != 0; }
 };
 
 // 1 byte | uint32, arrays: bytes
@@ -208,11 +221,8 @@ struct Form<CdrForm::Char> : SmallForm<uint8_t, ProtobufForm::String> {
   static constexpr bool is_value(uint8_t raw) { return raw <= kLargestCharacter; }
   static constexpr const char* kValues = "a char goes from 0 to 127 (ASCII)";
   static constexpr const char* kRange = "char; give a number from 0 to 127 (ASCII)";
-  static constexpr bool from_wire(uint64_t value, uint8_t* raw, int64_t* refused) {
-    if (!SmallForm::from_wire(value, raw, refused)) return false;
-    if (is_value(*raw)) return true;
-    *refused = *raw;
-    return false;
+  static constexpr bool from_wire(uint64_t value, uint8_t* raw) {
+    return SmallForm::from_wire(value, raw) && is_value(*raw);
   }
 };
 
@@ -265,7 +275,7 @@ struct Form<CdrForm::Message> {
   static constexpr bool kIsNumber = false, kIsString = false;
   static constexpr ProtobufForm kSingle = ProtobufForm::Message, kMany = ProtobufForm::Message;
   static constexpr uint64_t kLargestCharacter = 0;
-  static constexpr const char *kValues = "", *kRange = "";
+  static constexpr const char* kValues = "";
 };
 
 // Calls `visitor` with the `Form` of a form. A form that has no `Form` does not compile.
