@@ -102,8 +102,8 @@ class Catalog:
     def _messages(self) -> dict[TypeName, Message]:
         return {}
 
-    def full_name(self, text: str) -> TypeName:
-        """Return the interface that `pkg/Name` or `pkg/msg/Name` means.
+    def type_name(self, text: str) -> TypeName:
+        """Return the type that `pkg/Name` or `pkg/msg/Name` means: an interface, or a part of one as `pkg/X_Request`.
 
         Raises:
             DefinitionError: There is none, or the short form could mean several.
@@ -111,17 +111,25 @@ class Catalog:
         package, _, rest = text.partition("/")
         if "/" in rest:
             try:
-                return self.definition(TypeName.parse(text)).name
+                name = TypeName.parse(text)
             except ValueError as error:
                 raise DefinitionError(str(error)) from None
+            self.definition(name)
+            return name
         self.package(package)
-        found = [self.owner(TypeName(package, namespace, rest)) for namespace in NAMESPACES]
-        candidates = [each for each in found if each]
+        names = [TypeName(package, namespace, rest) for namespace in NAMESPACES]
+        candidates = [each for each in names if self.owner(each)]
         if len(candidates) > 1:
             raise DefinitionError(
                 f"{text!r} could be any of {', '.join(map(str, candidates))}; give the full name"
             )
-        return candidates[0] if candidates else self.definition(TypeName(package, "msg", rest)).name
+        name = candidates[0] if candidates else TypeName(package, "msg", rest)
+        self.definition(name)
+        return name
+
+    def interface_name(self, text: str) -> TypeName:
+        """Return the interface that has the type which a text means; errors are those of `type_name`."""
+        return self.definition_name(self.type_name(text))
 
     def shadowed(self, names: Iterable[TypeName]) -> Iterator[tuple[Definition, Definition]]:
         """Yield what wins and what loses where two sources define one of `names` differently.

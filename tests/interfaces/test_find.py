@@ -531,9 +531,13 @@ PKG = {
 )
 def test_names(text: str, expected: str, tmp_path: Path) -> None:
     catalog = read(tmp_path, PKG)
-    assert catalog.full_name(text) == name(expected)
+    assert catalog.interface_name(text) == name(expected)
+    found = catalog.type_name(text)
+    assert (found.package, found.name) == (text.partition("/")[0], text.rpartition("/")[2])
+    assert catalog.definition_name(found) == name(expected)
     if text.count("/") == 2:
-        assert catalog.definition_name(name(text)) == catalog.owner(name(text)) == name(expected)
+        assert found == name(text)
+        assert catalog.owner(found) == name(expected)
         assert catalog.message(name(text)).name == name(text)
 
 
@@ -564,7 +568,11 @@ PLACE = "; looked in {}"
 )
 def test_errors_of_names(text: str, error: str, tmp_path: Path) -> None:
     catalog = read(tmp_path, PKG)
-    assert error_of(catalog.full_name, text) == error.replace("{}", str(tmp_path))
+    assert (
+        error_of(catalog.interface_name, text)
+        == error_of(catalog.type_name, text)
+        == error.replace("{}", str(tmp_path))
+    )
 
 
 # What belongs together
