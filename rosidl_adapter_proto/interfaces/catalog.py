@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.description import TypeDescription, describe, structs, type_hash
@@ -31,11 +33,8 @@ class Catalog:
 
     @cached_property
     def packages(self) -> Mapping[str, Package]:
-        """Every package, from the first source that has it."""
-        merged: dict[str, Package] = {}
-        for source in reversed(self.sources):
-            merged.update(source.packages)
-        return merged
+        """Every package, from the first source that has it; later ones are not even asked."""
+        return ChainMap(*(cast("dict[str, Package]", source.packages) for source in self.sources))
 
     def package(self, name: str) -> Package:
         """Return the definitions of a package.
@@ -136,11 +135,12 @@ class Catalog:
 
         The embedded store only stands in for packages that are nowhere else: it takes no part.
         """
+        sources = [source for source in self.sources if not source.stands_in]
         for name in names:
             winner = self.definition(name)
-            for source in self.sources:
+            for source in sources:
                 loser = source.packages.get(name.package, {}).get(name)
-                if loser is None or loser.stored_text is not None or loser.file == winner.file:
+                if loser is None or loser.file == winner.file:
                     continue
                 if not _is_same(winner, loser):
                     yield winner, loser

@@ -779,6 +779,25 @@ def test_which_distribution(
     assert (definition.text, definition.origin) == ("string data\n", source.origin)
 
 
+def test_the_store_is_read_when_it_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+
+    def definitions(distribution: str) -> dict[TypeName, str]:
+        read.append(distribution)
+        return {name("std_msgs/msg/Empty"): ""}
+
+    monkeypatch.setattr(store, "definitions", definitions)
+    mine = folder_source(write(tmp_path, {"a/msg/A.msg": "", "a/msg/B.msg": "A a"}))
+    catalog = Catalog((mine, store_source("humble")))
+
+    order = closure(catalog, ["a"])
+    assert list(catalog.shadowed(order)) == []
+    assert ("a" in catalog.packages, read) == (True, [])
+
+    assert "std_msgs" in catalog.packages
+    assert read == ["humble", store.newest_distribution()]
+
+
 def test_packages_before_the_store(tmp_path: Path) -> None:
     mine = folder_source(write(tmp_path, {"std_msgs/msg/String.msg": "string text"}))
     catalog = Catalog((mine, store_source("kilted")))
