@@ -7,7 +7,7 @@ these rows. A new file for each interface is a function, its template, and a row
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rosidl_adapter_proto.generate.settings import Options
 from rosidl_adapter_proto.generate.targets import Files, Generation, index, project, proto, python
@@ -21,22 +21,26 @@ class Output:
     Attributes:
         folder: Their folder in the output folder.
         place: Where what is in that folder goes in a prefix; None for where Python has its packages.
+        is_wanted: Whether options ask for them.
         interface_files: Makes those of one interface; paths are relative to the folder.
         common_files: Makes those that interfaces have in common.
-        is_wanted: Whether options ask for them.
     """
 
     folder: str
     place: str | None
+    is_wanted: Callable[[Options], bool] = field(kw_only=True)
     interface_files: Callable[[Generation, ProtoFile], Files] = lambda generation, file: {}
     common_files: Callable[[Generation], Files] = lambda generation: {}
-    is_wanted: Callable[[Options], bool] = lambda options: True
+
+
+def _always(options: Options) -> bool:
+    return True
 
 
 OUTPUTS = (
-    Output("proto", "share", proto.interface_files),
-    Output("python", None, python.interface_files, python.package_files),
-    Output("index", index.PLACE, common_files=index.resource_files),
+    Output("proto", "share", proto.interface_files, is_wanted=_always),
+    Output("python", None, python.interface_files, python.package_files, is_wanted=_always),
+    Output("index", index.PLACE, common_files=index.resource_files, is_wanted=_always),
 )
 
 SHARED_FOLDERS = {each.folder: each.place for each in OUTPUTS if each.place is not None}

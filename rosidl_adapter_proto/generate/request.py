@@ -74,7 +74,7 @@ def find_request(
             catalog = Catalog((source, *catalog.sources))
             packages += source.packages
         elif "/" in text:
-            types.append(catalog.full_name(text))
+            types.append(catalog.interface_name(text))
         else:
             catalog.package(text)
             packages.append(text)

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.description import TypeDescription, describe, structs, type_hash
@@ -31,11 +33,8 @@ class Catalog:
 
     @cached_property
     def packages(self) -> Mapping[str, Package]:
-        """Every package, from the first source that has it."""
-        merged: dict[str, Package] = {}
-        for source in reversed(self.sources):
-            merged.update(source.packages)
-        return merged
+        """Every package, from the first source that has it; later ones are not even asked."""
+        return ChainMap(*(cast("dict[str, Package]", source.packages) for source in self.sources))
 
     def package(self, name: str) -> Package:
         """Return the definitions of a package.
@@ -102,8 +101,8 @@ class Catalog:
     def _messages(self) -> dict[TypeName, Message]:
         return {}
 
-    def full_name(self, text: str) -> TypeName:
-        """Return the interface that `pkg/Name` or `pkg/msg/Name` means.
+    def type_name(self, text: str) -> TypeName:
+        """Return the type that `pkg/Name` or `pkg/msg/Name` means: an interface, or a part of one as `pkg/X_Request`.
 
         Raises:
             DefinitionError: There is none, or the short form could mean several.
@@ -111,28 +110,37 @@ class Catalog:
         package, _, rest = text.partition("/")
         if "/" in rest:
             try:
-                return self.definition(TypeName.parse(text)).name
+                name = TypeName.parse(text)
             except ValueError as error:
                 raise DefinitionError(str(error)) from None
+            self.definition(name)
+            return name
         self.package(package)
-        found = [self.owner(TypeName(package, namespace, rest)) for namespace in NAMESPACES]
-        candidates = [each for each in found if each]
+        names = [TypeName(package, namespace, rest) for namespace in NAMESPACES]
+        candidates = [each for each in names if self.owner(each)]
         if len(candidates) > 1:
             raise DefinitionError(
                 f"{text!r} could be any of {', '.join(map(str, candidates))}; give the full name"
             )
-        return candidates[0] if candidates else self.definition(TypeName(package, "msg", rest)).name
+        name = candidates[0] if candidates else TypeName(package, "msg", rest)
+        self.definition(name)
+        return name
+
+    def interface_name(self, text: str) -> TypeName:
+        """Return the interface that has the type which a text means; errors are those of `type_name`."""
+        return self.definition_name(self.type_name(text))
 
     def shadowed(self, names: Iterable[TypeName]) -> Iterator[tuple[Definition, Definition]]:
         """Yield what wins and what loses where two sources define one of `names` differently.
 
         The embedded store only stands in for packages that are nowhere else: it takes no part.
         """
+        sources = [source for source in self.sources if not source.stands_in]
         for name in names:
             winner = self.definition(name)
-            for source in self.sources:
+            for source in sources:
                 loser = source.packages.get(name.package, {}).get(name)
-                if loser is None or loser.stored_text is not None or loser.file == winner.file:
+                if loser is None or loser.file == winner.file:
                     continue
                 if not _is_same(winner, loser):
                     yield winner, loser

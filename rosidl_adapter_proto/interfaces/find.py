@@ -117,10 +117,12 @@ class Source:
     Attributes:
         origin: What it is, for people.
         packages: The definitions of each package.
+        stands_in: Whether it only stands in for packages that are nowhere else.
     """
 
     origin: str
     packages: Mapping[str, Package]
+    stands_in: bool = False
 
 
 def folder_source(folder: Path) -> Source:
@@ -258,7 +260,33 @@ def store_source(distribution: str | None = None) -> Source:
     if distribution is None:
         sourced = os.environ.get("ROS_DISTRO", "")
         distribution = sourced if sourced in store.distributions() else store.newest_distribution()
+    else:
+        store.check_distribution(distribution)
     origin = f"embedded store {distribution}"
+    return Source(origin, _StorePackages(distribution, origin), stands_in=True)
+
+
+class _StorePackages(Mapping[str, Package]):
+    """The packages of the embedded store, which takes long to read: that waits until somebody asks for one."""
+
+    def __init__(self, distribution: str, origin: str) -> None:
+        self._distribution, self._origin = distribution, origin
+
+    @cached_property
+    def _packages(self) -> Mapping[str, Package]:
+        return _store_packages(self._distribution, self._origin)
+
+    def __getitem__(self, name: str) -> Package:
+        return self._packages[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._packages)
+
+    def __len__(self) -> int:
+        return len(self._packages)
+
+
+def _store_packages(distribution: str, origin: str) -> Mapping[str, Package]:
     ros1_names = store.has_ros1_names(distribution)
     packages: dict[str, dict[TypeName, Definition]] = {}
     texts = store.definitions(distribution)
@@ -269,7 +297,7 @@ def store_source(distribution: str | None = None) -> Source:
     for name, text in texts.items():
         definition = Definition(name, ".msg", f"{origin}: {name}", origin, text, ros1_names)
         packages.setdefault(name.package, {})[name] = definition
-    return Source(origin, packages)
+    return packages
 
 
 _USED_BY_ROS_ITSELF = ("builtin_interfaces", "service_msgs", "unique_identifier_msgs")

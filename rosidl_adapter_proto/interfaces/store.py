@@ -30,16 +30,21 @@ def newest_distribution() -> str:
     return distributions()[-1]
 
 
-def definitions(distribution: str) -> dict[TypeName, str]:
-    """Return the `.msg` text of every message of a distribution.
+def check_distribution(distribution: str) -> None:
+    """Check that a distribution is in the store.
 
     Raises:
-        DefinitionError: There is no such distribution in the store.
+        DefinitionError: It is not.
     """
     if distribution not in distributions():
         raise DefinitionError(
             f"the embedded store has no distribution {distribution!r}; it has {', '.join(distributions())}"
         )
+
+
+def definitions(distribution: str) -> dict[TypeName, str]:
+    """Return the `.msg` text of every message of a distribution; errors are those of `check_distribution`."""
+    check_distribution(distribution)
     from rosbags.typesys import Stores, get_typestore
 
     generation = "ros1" if distribution == _ROS1 else "ros2"

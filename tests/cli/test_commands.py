@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 
 import rosidl_adapter_proto
+from rosidl_adapter_proto.cli import program
 from tests.cli.conftest import Run
 from tests.folders import write_package
 
@@ -109,15 +113,39 @@ def test_show(folder: Path, run: Run) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["my_msgs/A", "my_msgs/srv/A", "my_msgs/srv/A_Request"])
-def test_show_a_service(name: str, folder: Path, run: Run) -> None:
+@pytest.mark.parametrize(
+    ("name", "full_name"),
+    [
+        ("my_msgs/A", "my_msgs/srv/A"),
+        ("my_msgs/srv/A", "my_msgs/srv/A"),
+        ("my_msgs/A_Request", "my_msgs/srv/A_Request"),
+        ("my_msgs/srv/A_Request", "my_msgs/srv/A_Request"),
+    ],
+)
+def test_show_a_service(name: str, full_name: str, folder: Path, run: Run) -> None:
     write_package(folder / "src" / "my_msgs", {"srv/A.srv": "bool a\n---\n"})
 
     shown = run("show", name, "-I", "src").out
-    assert shown.startswith("my_msgs/srv/A from ")
+    assert shown.startswith(f"{full_name} from src/my_msgs/srv/A.srv\ntype hash RIHS01_")
     assert "message A_Response {" in shown
     assert "A_Event" not in shown
     assert "message A_Event {" in run("show", name, "-I", "src", "--events").out
+
+
+@pytest.mark.parametrize(
+    ("name", "type_hash"),
+    [
+        ("SetBool", "abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"),
+        ("SetBool_Request", "c62fbb99d94e1b25e8ef9e109f9581956bb1b3361a45a4e5810c36a90d29932e"),
+    ],
+)
+def test_show_the_hash_of_what_was_asked_for(name: str, type_hash: str, folder: Path, run: Run) -> None:
+    """The hashes are those that ROS installs in SetBool.json."""
+    write_package(folder / "std_srvs", {"srv/SetBool.srv": "bool data\n---\nbool success\nstring message\n"})
+
+    shown = run("show", f"std_srvs/srv/{name}", "-I", "std_srvs").out
+
+    assert shown.splitlines()[1] == f"type hash RIHS01_{type_hash}"
 
 
 def test_show_numbers_of_a_lock_file(folder: Path, run: Run) -> None:
@@ -187,6 +215,22 @@ def test_every_command_is_listed(run: Run) -> None:
         "lock",
         "show",
     ]
+
+
+def full_names(command: click.Command, name: str) -> Iterator[str]:
+    """Yield the name of a command, or those of a group's."""
+    if not isinstance(command, click.Group):
+        yield name
+        return
+    for each, part in command.commands.items():
+        yield from full_names(part, f"{name} {each}")
+
+
+@pytest.mark.parametrize("name", [*full_names(program, "rosidl-proto")])
+def test_the_documents_have_every_command(name: str) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "command-line.md").read_text(encoding="utf-8")
+
+    assert re.search(rf"\b{name}\b", text)
 
 
 @pytest.mark.parametrize(

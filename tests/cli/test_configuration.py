@@ -8,7 +8,7 @@ import click
 import pytest
 
 from rosidl_adapter_proto.cli.commands import generate
-from rosidl_adapter_proto.generate.settings import SETTINGS as SETTINGS_BY_NAME
+from rosidl_adapter_proto.generate.settings import SETTINGS
 from tests.cli.conftest import Run
 from tests.folders import content, write_package
 
@@ -27,7 +27,7 @@ events = true
 python-root = "my_protos"
 distro = "humble"
 """
-SETTINGS = "deps, distro, events, include, lock-file, numbering, output, packages, python-root"
+NAMES = ", ".join(sorted(SETTINGS))
 
 
 def configure(folder: Path, text: str) -> Path:
@@ -145,15 +145,15 @@ def test_help_shows_what_is_set(folder: Path, run: Run) -> None:
     [
         (
             "[tool.rosidl-proto]\noutptu = 'x'",
-            "[tool.rosidl-proto] has no setting 'outptu'; it has " + SETTINGS,
+            "[tool.rosidl-proto] has no setting 'outptu'; it has " + NAMES,
         ),
         (
             "[tool.rosidl-proto]\nlock_file = 'x'",
-            "[tool.rosidl-proto] has no setting 'lock_file'; it has " + SETTINGS,
+            "[tool.rosidl-proto] has no setting 'lock_file'; it has " + NAMES,
         ),
         (
             "[tool.rosidl-proto]\ncheck = true",
-            "[tool.rosidl-proto] has no setting 'check'; it has " + SETTINGS,
+            "[tool.rosidl-proto] has no setting 'check'; it has " + NAMES,
         ),
         (
             "[tool.rosidl-proto]\npackages = 'std_msgs'",
@@ -235,7 +235,7 @@ def test_the_settings_are_the_options_of_the_commands() -> None:
         for parameter in generate.command.params
     }
 
-    assert names - {"check", "renumber", "verbose"} == set(SETTINGS_BY_NAME)
+    assert names - {"check", "renumber", "verbose"} == set(SETTINGS)
 
 
 @pytest.mark.parametrize("text", ["", "tool = 1", "[tool]\nother = 1", "[tool.rosidl-proto]"])

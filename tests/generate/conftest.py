@@ -18,10 +18,14 @@ os.environ.setdefault("ROS_PYTHON_CHECK_FIELDS", "1")
 
 from rosidl_adapter_proto.adapter import TypeAdapter
 from rosidl_adapter_proto.generate import Options, Request, generate
+from rosidl_adapter_proto.generate.settings import OPTIONS, Kind
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
 from tests.strategies import RosMessages, message_names
+
+EVERY_FLAG: dict[str, Any] = {each.attribute: True for each in OPTIONS if each.kind is Kind.FLAG}
+"""Options with which everything is made that is optional."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from rosidl_adapter_proto.generate import Options, Request, generate
 from rosidl_adapter_proto.generate.manifest import MANIFEST_NAME
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import folder_source, store_source
+from tests.generate.conftest import EVERY_FLAG
 from tests.things import PROTOC_TAKES_JSON_CONFLICTS
 
 GOLDEN = Path(__file__).parents[1] / "golden"
@@ -24,17 +26,21 @@ def generated(folder: Path, options: Options) -> dict[str, str]:
     return {path: file.read_text(encoding="utf-8") for path, file in sorted(files.items())}
 
 
-# What numbering and events change is in the .proto files; the Python of one variant is enough to review.
-PARTS = {"hash": "", "sequential": "proto/"}
+VARIANTS: dict[str, dict[str, Any]] = {
+    "hash": {},
+    "sequential": {"numbering": "sequential", **EVERY_FLAG},
+}
+"""What each is generated with: the defaults, and everything there is."""
+NOT_REVIEWED = {"hash": (), "sequential": ("python/",)}
+"""Folders that are no part of it: the Python of one variant is enough to review."""
 
 
 @pytest.mark.skipif(not PROTOC_TAKES_JSON_CONFLICTS, reason="needs grpcio-tools 1.66 or newer")
-@pytest.mark.parametrize("variant", ["hash", "sequential"])
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_golden(variant: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     lock_file = tmp_path / "rosidl-proto.lock"
-    options = Options(numbering=variant, lock_file=lock_file, events=variant == "sequential")
-    files = generated(tmp_path / "out", options)
-    files = {path: text for path, text in files.items() if path.startswith(PARTS[variant])}
+    files = generated(tmp_path / "out", Options(lock_file=lock_file, **VARIANTS[variant]))
+    files = {path: text for path, text in files.items() if not path.startswith(NOT_REVIEWED[variant])}
     if lock_file.exists():
         files[lock_file.name] = lock_file.read_text()
     expected = GOLDEN / variant

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import sys
+import sysconfig
 from pathlib import Path
 
 import pytest
@@ -13,9 +15,10 @@ from rosidl_adapter_proto.generate.outputs import OUTPUTS, SHARED_FOLDERS, Outpu
 from rosidl_adapter_proto.generate.targets import Files, Generation
 from rosidl_adapter_proto.hooks.cmake import cmake_folder
 from rosidl_adapter_proto.interfaces.catalog import Catalog
-from rosidl_adapter_proto.interfaces.find import folder_source, store_source
+from rosidl_adapter_proto.interfaces.find import folder_source, prefix_sources, store_source
 from rosidl_adapter_proto.schema.proto import ProtoFile
-from tests.folders import write_package
+from tests.folders import content, write_package
+from tests.generate.conftest import EVERY_FLAG
 
 
 def test_cmake_installs_every_output() -> None:
@@ -31,6 +34,35 @@ def test_where_outputs_go() -> None:
     assert len({(each.folder, each.place) for each in OUTPUTS}) == len({each.folder for each in OUTPUTS})
     assert SHARED_FOLDERS.items() >= {"proto": "share", "index": "share/ament_index/resource_index"}.items()
     assert places("lib") == {**SHARED_FOLDERS, "python": "lib"}
+
+
+# What rosidl_generate_interfaces and ament_package install of any package, its Python apart.
+INSTALLED_BY_ROS = re.compile(
+    r"share/[^/]+/(msg|srv|action)/[^/]+\.(msg|srv|action|idl|json)"
+    r"|share/[^/]+/((cmake|environment)/.*|(package|local_setup)\..*)"
+    r"|include/.*|lib/[^/]*|share/ament_index/resource_index/(packages|rosidl_interfaces)/.*"
+)
+
+
+def test_no_output_lands_on_a_path_of_ros(tmp_path: Path) -> None:
+    """Neither on a file that ROS has installed of the packages, nor where it installs those of others."""
+    prefix = Path(sys.prefix)
+    if not (prefix / "share/test_msgs/action/Fibonacci.action").is_file():
+        pytest.skip("needs a ROS installation")
+    python_folder = Path(sysconfig.get_path("purelib")).relative_to(prefix).as_posix()
+    request = Request(("std_msgs", "std_srvs", "test_msgs"))
+
+    generate(request, Catalog(tuple(prefix_sources())), tmp_path / "out", Options(**EVERY_FLAG))
+    install(tmp_path / "out", tmp_path / "prefix", places(python_folder))
+
+    folders = {each.name for each in (tmp_path / "out").iterdir() if each.is_dir()}
+    assert folders == {each.folder for each in OUTPUTS}
+    python_of_ros = tuple(f"{python_folder}/{package}/" for package in request.packages)
+    for path, data in content(tmp_path / "prefix").items():
+        if data is not None:
+            assert not (prefix / path).exists(), path
+            assert not INSTALLED_BY_ROS.fullmatch(path), path
+            assert not path.startswith(python_of_ros), path
 
 
 def test_a_new_row_is_written_installed_and_part_of_the_project(

@@ -132,8 +132,8 @@ PACKAGES = {
         "number_msgs/msg/Track.id: {src}/rosidl-proto.lock has number 1 for it with type string, but its type is ",
         SEQUENTIAL,
         {
-            "rosidl-proto.lock": '{"version": 1, "messages": {"number_msgs/msg/Track": {"fields": {"id": "1 string"}, '
-            '"removed": {}}}}'
+            "rosidl-proto.lock": '{"version": 2, "messages": {"number_msgs/msg/Track": {"fields": '
+            '{"id": "1 string (string)"}, "removed": {}}}}'
         },
     ),
     "no_python_msgs": Package(

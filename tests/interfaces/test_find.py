@@ -531,9 +531,13 @@ PKG = {
 )
 def test_names(text: str, expected: str, tmp_path: Path) -> None:
     catalog = read(tmp_path, PKG)
-    assert catalog.full_name(text) == name(expected)
+    assert catalog.interface_name(text) == name(expected)
+    found = catalog.type_name(text)
+    assert (found.package, found.name) == (text.partition("/")[0], text.rpartition("/")[2])
+    assert catalog.definition_name(found) == name(expected)
     if text.count("/") == 2:
-        assert catalog.definition_name(name(text)) == catalog.owner(name(text)) == name(expected)
+        assert found == name(text)
+        assert catalog.owner(found) == name(expected)
         assert catalog.message(name(text)).name == name(text)
 
 
@@ -564,7 +568,11 @@ PLACE = "; looked in {}"
 )
 def test_errors_of_names(text: str, error: str, tmp_path: Path) -> None:
     catalog = read(tmp_path, PKG)
-    assert error_of(catalog.full_name, text) == error.replace("{}", str(tmp_path))
+    assert (
+        error_of(catalog.interface_name, text)
+        == error_of(catalog.type_name, text)
+        == error.replace("{}", str(tmp_path))
+    )
 
 
 # What belongs together
@@ -769,6 +777,25 @@ def test_which_distribution(
     definition = source.packages["std_msgs"][name("std_msgs/msg/String")]
     assert definition.file == f"embedded store {expected}: std_msgs/msg/String"
     assert (definition.text, definition.origin) == ("string data\n", source.origin)
+
+
+def test_the_store_is_read_when_it_is_needed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+
+    def definitions(distribution: str) -> dict[TypeName, str]:
+        read.append(distribution)
+        return {name("std_msgs/msg/Empty"): ""}
+
+    monkeypatch.setattr(store, "definitions", definitions)
+    mine = folder_source(write(tmp_path, {"a/msg/A.msg": "", "a/msg/B.msg": "A a"}))
+    catalog = Catalog((mine, store_source("humble")))
+
+    order = closure(catalog, ["a"])
+    assert list(catalog.shadowed(order)) == []
+    assert ("a" in catalog.packages, read) == (True, [])
+
+    assert "std_msgs" in catalog.packages
+    assert read == ["humble", store.newest_distribution()]
 
 
 def test_packages_before_the_store(tmp_path: Path) -> None:

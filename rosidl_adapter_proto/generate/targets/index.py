@@ -51,10 +51,21 @@ class GeneratedPackage:
         """Return what a resource says.
 
         Raises:
-            ValueError, TypeError, KeyError: It is none, or one of another version.
+            ValueError: It is none, or one of a newer version.
         """
-        facts = {**json.loads(content)}
-        return cls(options={name: facts.pop(name) for name in Options().changing_output()}, **facts)
+        facts = json.loads(content)
+        if not isinstance(facts, dict):
+            raise ValueError("it is not a JSON object")
+        # A version that did not have an option yet made what its default makes.
+        facts = {**Options().changing_output(), **facts}
+        try:
+            interfaces, definitions = facts.pop("interfaces"), facts.pop("definitions")
+        except KeyError as error:
+            raise ValueError(f"{error} is missing") from None
+        options = {name: facts.pop(name) for name in Options().changing_output()}
+        if facts:
+            raise ValueError(f"it has {', '.join(map(repr, facts))}, which only a newer version knows")
+        return cls(interfaces, definitions, options)
 
 
 @dataclass(frozen=True)
@@ -107,7 +118,7 @@ def installed_package(prefix: Path, name: str) -> GeneratedPackage | None:
         return None
     try:
         return GeneratedPackage.from_json(content)
-    except (ValueError, TypeError, KeyError) as error:
+    except ValueError as error:
         raise _unreadable(prefix, name, error) from None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rosidl_adapter_proto.adapter.contract import CONTRACT_VERSION
 from rosidl_adapter_proto.generate.render import format_python, render
 from rosidl_adapter_proto.generate.targets import Files, Generation
 from rosidl_adapter_proto.generate.targets.python.layout import Layout, quoted
@@ -47,7 +48,7 @@ def package_files(generation: Generation) -> Files:
 def _module(template: str, *, stub: bool = False, **values: Any) -> str:
     """Render a module as black formats it. Black itself is only asked if there is something that it may change."""
     layout = Layout()
-    text = render(template, layout=layout, **values)
+    text = render(template, layout=layout, contract_version=CONTRACT_VERSION, **values)
     return text if layout.is_complete(text) else format_python(text, stub=stub)
 
 
