@@ -28,16 +28,18 @@ constexpr Range kNowhere = {UINT64_MAX, UINT64_MAX};
 constexpr uint64_t kBlockSize = 32 * 1024;
 constexpr size_t kBlockMessages = 256;
 
-// Calls `work(i)` for each i below `count`, in order of i, on up to `threads` threads. `work` does not throw.
+// Calls `work(i)` for each i below `count`, in order of i, on up to `threads` threads, but on no more than the
+// machine runs at once: blocks wait for their turn. `work` does not throw.
 template <class Work>
 void run_on_threads(size_t threads, size_t count, Work work) {
   std::atomic<size_t> next{0};
   const auto loop = [&] {
     for (size_t i = next++; i < count; i = next++) work(i);
   };
+  const size_t at_once = std::max<size_t>(std::thread::hardware_concurrency(), 1);
   std::vector<std::thread> others;
   try {
-    for (size_t i = 1; i < std::min(threads, count); ++i) others.emplace_back(loop);
+    for (size_t i = 1; i < std::min({threads, count, at_once}); ++i) others.emplace_back(loop);
   } catch (const std::exception&) {
     // The system has no more threads: those that there are do all of it.
   }

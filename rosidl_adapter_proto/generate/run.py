@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -110,8 +110,7 @@ def generate(
     manifest = make_manifest(new_fingerprint, names, files, numbers)
     changed = changes(output, files)
     # An unchanged run does not repeat those of definitions, since it parses nothing.
-    of_definitions = tuple(each for name in names for each in catalog.definition(name).interface.warnings)
-    warnings = (*of_definitions, *_warnings(catalog, names))
+    warnings = (*_definition_warnings(catalog, names), *_warnings(catalog, names))
     if not check:
         # The lock file comes first: numbers that nothing uses yet do no harm, but used ones that are not kept do.
         if new_lock_text is not None and new_lock_text != lock_text:
@@ -215,6 +214,10 @@ def _check_python_root(name: str) -> None:
 
 def _is_wanted(name: TypeName, request: Request) -> bool:
     return request.dependencies or name.package in request.packages or name in request.types
+
+
+def _definition_warnings(catalog: Catalog, names: Iterable[TypeName]) -> Iterator[str]:
+    return (each for name in names for each in catalog.definition(name).interface.warnings)
 
 
 def _warnings(catalog: Catalog, names: Iterable[TypeName]) -> tuple[str, ...]:

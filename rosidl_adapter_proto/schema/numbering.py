@@ -126,7 +126,7 @@ class SequentialNumbering:
             content = json.loads(text, object_pairs_hook=_unique)
             if content["version"] not in _READ_VERSIONS:
                 raise SchemaError(
-                    f"{file} has version {content['version']}, this program reads version {_LOCK_VERSION}; "
+                    f"{file} has version {content['version']}, this program reads {' and '.join(map(str, _READ_VERSIONS))}; "
                     "use the version of rosidl-proto that wrote it, or a newer one"
                 )
             messages = {

@@ -393,7 +393,7 @@ def test_a_lock_file_of_another_version() -> None:
     with pytest.raises(SchemaError) as caught:
         SequentialNumbering.from_lock(LOCK, '{"version": 3}')
     assert str(caught.value) == (
-        f"{LOCK} has version 3, this program reads version 2; "
+        f"{LOCK} has version 3, this program reads 1 and 2; "
         "use the version of rosidl-proto that wrote it, or a newer one"
     )
 
