@@ -51,7 +51,7 @@ def adapter_for(type_name: str, registry: TypeRegistry | None = None) -> Any:
     with _lock:
         if registry is None:
             registry = _default_registry()
-        return _adapter(registry, registry[type_name])
+        return _adapter(registry[type_name])
 
 
 @cache
@@ -59,17 +59,17 @@ def _default_registry() -> TypeRegistry:
     return TypeRegistry()
 
 
-def _adapter(registry: TypeRegistry, schema: Schema) -> Any:
+def _adapter(schema: Schema) -> Any:
     """Return an adapter; those of all that it refers to are made before it."""
-    made = _made.setdefault(registry, {})
+    made = _made.setdefault(schema.registry, {})
     name = TypeName.parse(schema.type_name)
     if name not in made:
         if schema.parts:
-            made[name] = _group_adapter(registry, schema)
+            made[name] = _group_adapter(schema)
         else:
             for each in _innermost_first(schema.type_description):
                 if each not in made:
-                    made[each] = _message_adapter(registry, registry[each], made)
+                    made[each] = _message_adapter(schema.registry[each], made)
     return made[name]
 
 
@@ -83,16 +83,16 @@ def _innermost_first(description: TypeDescription) -> Iterable[TypeName]:
     return map(TypeName.parse, TopologicalSorter(nested).static_order())
 
 
-def _group_adapter(registry: TypeRegistry, schema: Schema) -> Any:
+def _group_adapter(schema: Schema) -> Any:
     base = ServiceAdapter if "request" in schema.parts else ActionAdapter
-    parts = {part: _adapter(registry, each) for part, each in schema.parts.items()}
+    parts = {part: _adapter(each) for part, each in schema.parts.items()}
     custom_types = {
         NAMED_PARTS[part]: each.custom_type for part, each in parts.items() if part in NAMED_PARTS
     }
     return _class(schema, base, {**parts, **custom_types})
 
 
-def _message_adapter(registry: TypeRegistry, schema: Schema, adapters: Mapping[TypeName, Any]) -> Any:
+def _message_adapter(schema: Schema, adapters: Mapping[TypeName, Any]) -> Any:
     proto = schema.message
     assert proto is not None  # it has no parts
     return _class(
@@ -115,7 +115,7 @@ def _message_adapter(registry: TypeRegistry, schema: Schema, adapters: Mapping[T
                 for each in proto.fields
                 if each.default is not None
             },
-            "has_defaults": has_defaults(proto.source, lambda name: _source(registry[name])),
+            "has_defaults": has_defaults(proto.source, lambda name: _source(schema.registry[name])),
             **{constant_name(name, proto.name): value for name, value in schema.constants.items()},
             **_conversions(proto, adapters),
         },

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Iterator
 from operator import attrgetter
+from pathlib import PurePosixPath
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -12,7 +12,9 @@ from google.protobuf.message import Message
 
 from rosidl_adapter_proto.adapter import ActionAdapter, ServiceAdapter, TypeAdapter
 from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.ros.type_hash import check_type_hash
+from rosidl_adapter_proto.schema.generated import generated_module, import_if_there
 from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
 
 if TYPE_CHECKING:
@@ -169,18 +171,13 @@ def _search(kind: Kind, custom_type: type[Message]) -> Any:
 
 def _adapter_modules(custom_type: type[Message]) -> Iterator[ModuleType]:
     """Yield where an adapter was generated: beside the protobuf class, or where its `.proto` file belongs."""
-    descriptor_path = custom_type.DESCRIPTOR.file.name.removesuffix(".proto").replace("/", ".")
-    for name in (
-        str(custom_type.__module__).removesuffix("_pb2"),
-        f"{DEFAULT_PYTHON_ROOT}.{descriptor_path}",
-    ):
-        module_name = f"{name}_adapter"
-        try:
-            yield importlib.import_module(module_name)
-        except ModuleNotFoundError as error:
-            # A module that is there, but cannot import another one, is broken, and says so.
-            if error.name is None or not f"{module_name}.".startswith(f"{error.name}."):
-                raise
+    path = PurePosixPath(custom_type.DESCRIPTOR.file.name).with_suffix("")
+    modules = [str(custom_type.__module__).removesuffix("_pb2")]
+    if len(path.parts) == 3:  # package/namespace/Name, as all that is generated
+        modules.append(generated_module(TypeName(*path.parts), DEFAULT_PYTHON_ROOT))
+    for module in modules:
+        if (found := import_if_there(f"{module}_adapter")) is not None:
+            yield found
 
 
 def _subclasses(base: type) -> Iterator[Any]:

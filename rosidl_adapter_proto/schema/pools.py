@@ -1,13 +1,12 @@
-"""Where protobuf classes are that are made at run time: in the pool of generated code, if that can have them.
+"""Where protobuf classes are that are made at run time.
 
 A descriptor pool holds one version of each file. Classes of the default pool are shared with generated code, whichever
-comes first; what that cannot have, since it has another version, goes into another pool.
+comes first; a registry with other versions has a pool of its own, for all its types.
 """
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from threading import RLock
 from typing import Any, NamedTuple
 
@@ -16,10 +15,10 @@ from google.protobuf.descriptor import Descriptor, FileDescriptor
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message import Message
 
-from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.interfaces.model import TypeName
+from rosidl_adapter_proto.schema.generated import generated_module, import_if_there
 from rosidl_adapter_proto.schema.proto import ProtoFile
-from rosidl_adapter_proto.schema.typemap import DEFAULT_PYTHON_ROOT
+from rosidl_adapter_proto.schema.typemap import proto_path
 
 MessageClass = type[Message]
 
@@ -36,50 +35,81 @@ class File(NamedTuple):
         return self.proto.source.name
 
 
-class _RefusedError(Exception):
-    """A pool has another version of a file or message, or does not take it at all."""
+class RefusedError(Exception):
+    """A pool does not take a file: it has another version, or a message of the same name."""
 
 
-_lock = RLock()
+lock = RLock()
+"""Held while something is looked for in pools and put into them."""
 
-_other_pools: list[DescriptorPool] = []
-"""Pools for versions of types that the default pool cannot have."""
+_own_pools: dict[Hashable, DescriptorPool] = {}
+"""The pools of registries with other versions, by what decides their files: kept for good, as their classes are."""
 
 _kept_classes: set[MessageClass] = set()
 """Every class that was made: releases of protobuf before 4.22 crash where that of a nested message is gone."""
 
+_promised: dict[TypeName, str] = {}
+"""Definitions of registries that share the default pool: their files come into it when they are asked for."""
 
-def load(files: Sequence[File]) -> FileDescriptor:
-    """Return the last of some files in the first pool that can have them all, and make the classes of all messages.
+
+def default_pool() -> DescriptorPool:
+    """Return the pool of generated code."""
+    return descriptor_pool.Default()
+
+
+def own_pool(key: Hashable) -> DescriptorPool:
+    """Return the pool of all registries that have the same files.
 
     Args:
+        key: What decides the files.
+    """
+    return _own_pools.setdefault(key, DescriptorPool())
+
+
+def promise(name: TypeName, text: str) -> None:
+    """Keep the place of an interface in the default pool from other versions than that of a definition."""
+    _promised.setdefault(name, text)
+
+
+def is_promised_otherwise(name: TypeName, text: str) -> bool:
+    """Tell whether the place of an interface in the default pool is kept for another version."""
+    return _promised.get(name, text) != text
+
+
+def in_default_pool(interface: TypeName) -> FileDescriptor | None:
+    """Return the file of an interface in the default pool, in whatever version."""
+    return _find(default_pool(), proto_path(interface))
+
+
+def import_generated_code(interface: TypeName, python_root: str) -> None:
+    """Import generated code of an interface, if there is any.
+
+    If another version came into the default pool first, generated code could not be imported any more.
+    """
+    import_if_there(f"{generated_module(interface, python_root)}_pb2")
+
+
+def load(pool: DescriptorPool, files: Sequence[File], python_root: str) -> FileDescriptor:
+    """Return the last of some files in a pool, and make the classes of all messages.
+
+    Args:
+        pool: Where they are, or are put.
         files: A file and all that it imports, what is imported first.
+        python_root: As for `message_class`.
 
     Raises:
-        SchemaError: Not even a new pool takes them.
+        RefusedError: The pool does not take them.
     """
-    default = descriptor_pool.Default()
-    with _lock:
-        if not _other_version(default, files):
-            for file in files:
-                if _find(default, file) is None:
-                    _import_generated_code(file.interface)
-        for pool in (default, *_other_pools):
-            try:
-                return _load_into(pool, files)
-            except _RefusedError:
-                continue
-        pool = DescriptorPool()
-        try:
-            descriptor = _load_into(pool, files)
-        except _RefusedError as error:
-            name = files[-1].interface
-            raise SchemaError(f"{name}: protobuf does not take what it becomes: {error}") from None
-        _other_pools.append(pool)
-        return descriptor
+    for file in files:
+        descriptor = _find(pool, file.proto.path) or _added(pool, file)
+        if descriptor.serialized_pb != file.serialized:
+            raise RefusedError(f"there is another version of {file.proto.path}")
+        messages = descriptor.message_types_by_name.values()
+        _kept_classes.update(message_class(each, file.interface, python_root) for each in messages)
+    return descriptor
 
 
-def message_class(descriptor: Descriptor, interface: TypeName) -> MessageClass:
+def message_class(descriptor: Descriptor, interface: TypeName, python_root: str) -> MessageClass:
     """Return the class of a message, which is the one that there is if generated code has made it already.
 
     Else it gets the module that generated code would give it: if that comes later, it takes this class.
@@ -87,32 +117,18 @@ def message_class(descriptor: Descriptor, interface: TypeName) -> MessageClass:
     Args:
         descriptor: The message.
         interface: The interface that it is part of.
+        python_root: The namespace package of generated code.
     """
-    contents = {"DESCRIPTOR": descriptor, "__module__": _generated_module(interface)}
+    module = f"{generated_module(interface, python_root)}_pb2"
     metaclass: Any = reflection.GeneratedProtocolMessageType
+    contents = {"DESCRIPTOR": descriptor, "__module__": module}
     made: MessageClass = metaclass(descriptor.name, (Message,), contents)
     return made
 
 
-def _load_into(pool: DescriptorPool, files: Sequence[File]) -> FileDescriptor:
-    if other := _other_version(pool, files):
-        raise _RefusedError(f"there is another version of {other.proto.path}")
-    for file in files:
-        descriptor = _find(pool, file) or _added(pool, file)
-        messages = descriptor.message_types_by_name.values()
-        _kept_classes.update(message_class(each, file.interface) for each in messages)
-    return descriptor
-
-
-def _other_version(pool: DescriptorPool, files: Sequence[File]) -> File | None:
-    """Return the first file that a pool has in another version."""
-    found = ((each, _find(pool, each)) for each in files)
-    return next((each for each, there in found if there and there.serialized_pb != each.serialized), None)
-
-
-def _find(pool: DescriptorPool, file: File) -> FileDescriptor | None:
+def _find(pool: DescriptorPool, path: str) -> FileDescriptor | None:
     try:
-        return pool.FindFileByName(file.proto.path)
+        return pool.FindFileByName(path)
     except KeyError:
         return None
 
@@ -121,23 +137,5 @@ def _added(pool: DescriptorPool, file: File) -> FileDescriptor:
     try:
         pool.AddSerializedFile(file.serialized)
     except TypeError as error:
-        raise _RefusedError(str(error)) from None
+        raise RefusedError(str(error)) from None
     return pool.FindFileByName(file.proto.path)
-
-
-def _generated_module(interface: TypeName) -> str:
-    """Return the module that generated code has the protobuf classes of an interface in."""
-    return f"{DEFAULT_PYTHON_ROOT}.{interface.package}.{interface.namespace}.{interface.name}_pb2"
-
-
-def _import_generated_code(interface: TypeName) -> None:
-    """Import generated code of an interface, if there is any.
-
-    If another version came into the default pool first, generated code could not be imported any more.
-    """
-    module = _generated_module(interface)
-    try:
-        importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        if not f"{module}.".startswith(f"{error.name}."):  # what is missing is something that it needs
-            raise
