@@ -173,6 +173,18 @@ def test_names_in_a_registry() -> None:
     assert TypeName("registry_names", "srv", "Set") in registry
 
 
+def test_arguments_that_are_no_text() -> None:
+    unnamed: Any = 5
+    with pytest.raises(TypeError) as caught:
+        TypeRegistry()[unnamed]
+    assert str(caught.value) == "the name of a type has to be a str such as 'std_msgs/msg/Header', not 5"
+    for text, kind in ((5, "int"), (b"int8 x", "bytes")):
+        texts: Any = {"registry_no_text/msg/A": text}
+        with pytest.raises(TypeError) as caught:
+            TypeRegistry.from_texts(texts)
+        assert str(caught.value) == f"the definition of registry_no_text/msg/A has to be a str, not {kind}"
+
+
 @pytest.mark.parametrize(
     ("name", "error"),
     [
@@ -440,6 +452,44 @@ def test_another_version_than_that_of_generated_code(imported_first: bool, track
     """Neither is in the way of the other, whichever comes first."""
     python = tracker / "generated/python"
     assert run(sys.executable, "-c", OTHER_VERSION, str(imported_first), python, folder=tracker) == "a\n"
+
+
+OTHER_ROOT = """
+import pickle, sys
+from rosidl_adapter_proto import TypeRegistry
+
+first, definitions, python = sys.argv[1:]
+if first == "the same version":
+    made = TypeRegistry.from_folders(definitions, python_root="tracker_root")["tracker/msg/Track"]
+elif first == "another version":
+    texts = {"builtin_interfaces/msg/Time": "int64 t", "tracker/msg/Track": "std_msgs/Header header"}
+    made = TypeRegistry.from_texts(texts)["tracker/msg/Track"]
+elif first == "events":
+    made = TypeRegistry.from_folders(definitions, events=True)["tracker/srv/Reset_Event"]
+sys.path.insert(0, python)
+from tracker_root.tracker.msg import Track
+from tracker_root.tracker.srv import Reset_Request
+
+if first == "generated code":
+    made = TypeRegistry.from_folders(definitions)["tracker/msg/Track"]
+for message in (Track(x=3), Reset_Request(track=Track(x=4))):
+    assert pickle.loads(pickle.dumps(message)) == message
+print(made.message_class is Track)
+"""
+
+
+@pytest.mark.parametrize(
+    ("first", "is_shared"),
+    [("generated code", True), ("the same version", True), ("another version", False), ("events", False)],
+)
+def test_generated_code_below_another_root(first: str, is_shared: bool, tracker: Path) -> None:
+    catalog = Catalog((folder_source(tracker / "tracker"), *installed_sources()))
+    output = tracker / "other_root"
+    generate(Request(("tracker",)), catalog, output, Options(python_root="tracker_root"))
+    said = run(
+        sys.executable, "-c", OTHER_ROOT, first, tracker / "tracker", output / "python", folder=tracker
+    )
+    assert said == f"{is_shared}\n"
 
 
 def test_generated_code_with_other_numbers(tracker: Path) -> None:
