@@ -6,6 +6,7 @@ The work is done by methods of the native module, which `_core.pyi` describes; t
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -41,7 +42,7 @@ class Batch:
         buffer: The results, one after the other.
         ranges: Where in the buffer they are: the first byte and the one after the last of each, in one row of
             unsigned 64-bit numbers. A message that failed has `NOWHERE` twice. With the buffer they can be given to
-            another batch.
+            another batch, if none failed.
         errors: The error of each message that failed, by its index.
     """
 
@@ -158,9 +159,10 @@ def _batch(
     into: Buffer | None,
 ) -> Batch:
     """Call a native method, and wrap what it returns."""
-    if operator.index(threads) < 1:
+    threads = operator.index(threads)
+    if threads < 1:
         raise ValueError("threads must be 1 or more")
-    buffer, size, places, errors = transcode(messages, ranges, threads, into)
+    buffer, size, places, errors = transcode(messages, ranges, min(threads, sys.maxsize), into)
     return Batch(memoryview(buffer).cast("B")[:size], memoryview(places).cast("Q"), errors)
 
 
