@@ -117,10 +117,12 @@ class Source:
     Attributes:
         origin: What it is, for people.
         packages: The definitions of each package.
+        limit: What it can have at all, for people; empty if that is everything.
     """
 
     origin: str
     packages: Mapping[str, Package]
+    limit: str = ""
 
 
 def folder_source(folder: Path) -> Source:
@@ -269,7 +271,7 @@ def store_source(distribution: str | None = None) -> Source:
     for name, text in texts.items():
         definition = Definition(name, ".msg", f"{origin}: {name}", origin, text, ros1_names)
         packages.setdefault(name.package, {})[name] = definition
-    return Source(origin, packages)
+    return Source(origin, packages, limit="messages only")
 
 
 _USED_BY_ROS_ITSELF = ("builtin_interfaces", "service_msgs", "unique_identifier_msgs")
