@@ -12,7 +12,7 @@ from typing import Any
 
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.request import Request, find_request, is_path
-from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Options, Setting
+from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Options, Setting, check_lock_file_is_used
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 
 if sys.version_info >= (3, 11):
@@ -101,7 +101,7 @@ def _values(section: Any, file: Path) -> dict[str, Any]:
     """Return the values of a section; paths that are not set are beside the configuration, wherever the program runs.
 
     Raises:
-        RequestError: A setting does not exist or is of another kind.
+        RequestError: A setting does not exist, is of another kind, or has no use.
     """
     if not isinstance(section, dict):
         raise RequestError(f"{file}: [{SECTION}] must be a table")
@@ -114,6 +114,8 @@ def _values(section: Any, file: Path) -> dict[str, Any]:
             )
         try:
             SETTINGS[name].check(value)
+            if name == "lock-file":
+                check_lock_file_is_used(section.get("numbering", SETTINGS["numbering"].default))
         except ValueError as error:
             raise RequestError(f"{file}: [{SECTION}] {name} {error}") from None
         values[name] = _located(SETTINGS[name], value, file)
