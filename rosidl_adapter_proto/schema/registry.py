@@ -133,7 +133,8 @@ class TypeRegistry:
     Args:
         catalog: Where definitions come from: by default what is installed (`AMENT_PREFIX_PATH` and the environment of
             this Python), and the embedded store.
-        lock_file: Where sequential field numbers are kept; without it, numbers are hashes of the names.
+        lock_file: Where sequential field numbers are kept, which `rosidl-proto generate` has written and which is
+            only read here; without it, numbers are hashes of the names.
         events: Whether services have their `_Event` messages, as in code generated with `--events`.
 
     Raises:
@@ -142,7 +143,7 @@ class TypeRegistry:
     """
 
     def __init__(
-        self, catalog: Catalog | None = None, *, lock_file: Path | None = None, events: bool = False
+        self, catalog: Catalog | None = None, *, lock_file: Path | str | None = None, events: bool = False
     ) -> None:
         self._catalog = Catalog(tuple(installed_sources())) if catalog is None else catalog
         self._numbering = _numbering(lock_file)
@@ -153,7 +154,7 @@ class TypeRegistry:
 
     @classmethod
     def from_folders(
-        cls, *folders: Path | str, lock_file: Path | None = None, events: bool = False
+        cls, *folders: Path | str, lock_file: Path | str | None = None, events: bool = False
     ) -> TypeRegistry:
         """Return a registry of the packages in some folders; what they do not have is what is installed.
 
@@ -172,7 +173,7 @@ class TypeRegistry:
 
     @classmethod
     def from_texts(
-        cls, texts: Mapping[str, str], *, lock_file: Path | None = None, events: bool = False
+        cls, texts: Mapping[str, str], *, lock_file: Path | str | None = None, events: bool = False
     ) -> TypeRegistry:
         """Return a registry of types that are given as text; what the texts do not have is what is installed.
 
@@ -213,7 +214,7 @@ class TypeRegistry:
         Raises:
             DefinitionError: There is no such type (the message names similar ones), something that it refers to is
                 missing, or a definition is not valid.
-            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it.
+            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it or does not have it.
         """
         type_name = name if isinstance(name, TypeName) else _parsed(name)
         with self._lock:
@@ -257,14 +258,14 @@ class TypeRegistry:
         return File(proto, file_descriptor(proto).SerializeToString(deterministic=True))
 
 
-def _numbering(lock_file: Path | None) -> Numbering:
+def _numbering(lock_file: Path | str | None) -> Numbering:
     if lock_file is None:
         return HashNumbering()
     try:
-        text = lock_file.read_text(encoding="utf-8")
+        text = Path(lock_file).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SchemaError(f"cannot read {lock_file}: {error}") from None
-    return SequentialNumbering.from_lock(str(lock_file), text)
+    return SequentialNumbering.from_lock(str(lock_file), text, is_complete=True)
 
 
 def _parsed(name: str) -> TypeName:
