@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,7 +19,7 @@ from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate import Options, Request, Result, generate
 from rosidl_adapter_proto.generate.configuration import read_configuration
 from rosidl_adapter_proto.generate.output_tree import Changes
-from rosidl_adapter_proto.generate.settings import OPTIONS, Kind, Setting
+from rosidl_adapter_proto.generate.settings import OPTIONS, SETTINGS, Kind, Setting
 from rosidl_adapter_proto.generate.targets.index import GeneratedPackage, generated_packages
 from rosidl_adapter_proto.hooks import ament
 from rosidl_adapter_proto.hooks.cmake import cmake_folder
@@ -231,3 +232,40 @@ def test_the_documents_have_it(option: Setting) -> None:
     assert f"`--{option.name}`" in (docs / "command-line.md").read_text(encoding="utf-8")
     variable = f"`ROSIDL_PROTO_{option.attribute.upper()}`"
     assert variable in (docs / "build-colcon.md").read_text(encoding="utf-8")
+
+
+def test_the_documents_have_all_settings() -> None:
+    text = (Path(__file__).parents[2] / "docs/command-line.md").read_text(encoding="utf-8")
+    configuration = text.partition("## Configuration\n")[2].partition("\n## ")[0]
+
+    assert re.findall(r"^\| `([a-z-]+)` \|", configuration, re.MULTILINE) == list(SETTINGS)
+
+
+@pytest.mark.parametrize(
+    ("file", "section"),
+    [
+        ("pyproject.toml", "tool.rosidl_proto"),
+        ("pyproject.toml", "rosidl-proto"),
+        ("setup.cfg", "tool.rosidl_proto"),
+        ("setup.cfg", "tool:rosidl-proto"),
+        ("setup.cfg", "rosidl-proto"),
+    ],
+)
+@pytest.mark.parametrize("also", ["", "[tool.rosidl-proto]\n"])
+def test_a_section_that_is_not_read(file: str, section: str, also: str, folder: Path) -> None:
+    Path(file).write_text(f"{also}[{section}]\n")
+
+    with pytest.raises(RequestError) as caught:
+        read_configuration(folder)
+
+    assert str(caught.value) == (
+        f"{folder / file}: [{section}] is not read; did you mean [tool.rosidl-proto]?"
+    )
+
+
+@pytest.mark.parametrize("section", ["tool.rosidl", "proto", "tool", "tool.rosidl_adapter_proto"])
+def test_a_section_of_others(section: str, folder: Path) -> None:
+    for file in ("pyproject.toml", "setup.cfg"):
+        Path(file).write_text(f"[{section}]\n")
+
+    assert read_configuration(folder) is None
