@@ -185,7 +185,16 @@ class TypeRegistry:
         Raises:
             DefinitionError: A name is not of the form `package/namespace/Name`.
             SchemaError: The lock file cannot be read or is damaged.
+            TypeError: The texts are no mapping, or one of them is no text.
         """
+        if not isinstance(texts, Mapping):
+            raise TypeError(
+                "texts must be a mapping from type names to definitions, such as "
+                f"{{'my_msgs/msg/Track': 'float64 x'}}, not {type(texts).__name__}"
+            )
+        for name, text in texts.items():
+            if not isinstance(text, str):
+                raise TypeError(f"the definition of {name!r} must be a text, not {type(text).__name__}")
         installed = Catalog(tuple(installed_sources()))
         given = text_source({_parsed(name): text for name, text in texts.items()})
         # Of a package, the texts may have some types only.
@@ -215,8 +224,9 @@ class TypeRegistry:
             DefinitionError: There is no such type (the message names similar ones), something that it refers to is
                 missing, or a definition is not valid.
             SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it or does not have it.
+            TypeError: The name is no text.
         """
-        type_name = name if isinstance(name, TypeName) else _parsed(name)
+        type_name = name if isinstance(name, TypeName) else _parsed(name, self._catalog)
         with self._lock:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._schema(type_name)
@@ -268,8 +278,16 @@ def _numbering(lock_file: Path | str | None) -> Numbering:
     return SequentialNumbering.from_lock(str(lock_file), text, is_complete=True)
 
 
-def _parsed(name: str) -> TypeName:
+def _parsed(name: str, catalog: Catalog | None = None) -> TypeName:
+    """Return the type of a name; of the short form `package/Name`, the error has what the catalog has of that name."""
+    if not isinstance(name, str):
+        raise TypeError(
+            f"the name of a type must be a text, such as 'sensor_msgs/msg/Imu', not {type(name).__name__}"
+        )
     try:
         return TypeName.parse(name)
     except ValueError as error:
-        raise DefinitionError(str(error)) from None
+        package, _, rest = name.partition("/")
+        known = catalog.packages.get(package, {}) if catalog else {}
+        full = " or ".join(str(each) for each in known if each.name == rest)
+        raise DefinitionError(f"{error}; did you mean {full}?" if full else str(error)) from None

@@ -188,6 +188,12 @@ def test_names_in_a_registry() -> None:
         ),
         ("Track", "'Track' is not of the form package/namespace/Name"),
         (
+            "registry_unknown/Track",
+            "'registry_unknown/Track' is not of the form package/namespace/Name; "
+            "did you mean registry_unknown/msg/Track?",
+        ),
+        ("registry_unknown/Trak", "'registry_unknown/Trak' is not of the form package/namespace/Name"),
+        (
             "registry_unknown/msg/Needy",
             "registry_lost/msg/A was not found, but registry_unknown/msg/Needy.a (*",
         ),
@@ -229,6 +235,27 @@ def test_what_cannot_be_had(name: str, error: str) -> None:
 def test_names_that_texts_cannot_have(name: str, error: str) -> None:
     with pytest.raises(DefinitionError) as caught:
         TypeRegistry.from_texts({name: "int8 x"})
+    assert str(caught.value) == error
+
+
+@pytest.mark.parametrize(
+    ("texts", "error"),
+    [
+        (
+            "float64 x",
+            "texts must be a mapping from type names to definitions, such as "
+            "{'my_msgs/msg/Track': 'float64 x'}, not str",
+        ),
+        (
+            {"registry_kind/msg/Track": b"float64 x"},
+            "the definition of 'registry_kind/msg/Track' must be a text, not bytes",
+        ),
+        ({5: "float64 x"}, "the name of a type must be a text, such as 'sensor_msgs/msg/Imu', not int"),
+    ],
+)
+def test_texts_of_another_kind(texts: Any, error: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        TypeRegistry.from_texts(texts)
     assert str(caught.value) == error
 
 
