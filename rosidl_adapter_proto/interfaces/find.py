@@ -118,11 +118,13 @@ class Source:
         origin: What it is, for people.
         packages: The definitions of each package.
         stands_in: Whether it only stands in for packages that are nowhere else.
+        limit: What it can have at all, for people; empty if that is everything.
     """
 
     origin: str
     packages: Mapping[str, Package]
     stands_in: bool = False
+    limit: str = ""
 
 
 def folder_source(folder: Path) -> Source:
@@ -263,7 +265,7 @@ def store_source(distribution: str | None = None) -> Source:
     else:
         store.check_distribution(distribution)
     origin = f"embedded store {distribution}"
-    return Source(origin, _StorePackages(distribution, origin), stands_in=True)
+    return Source(origin, _StorePackages(distribution, origin), stands_in=True, limit="messages only")
 
 
 class _StorePackages(Mapping[str, Package]):

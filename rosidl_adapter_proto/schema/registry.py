@@ -133,7 +133,8 @@ class TypeRegistry:
     Args:
         catalog: Where definitions come from: by default what is installed (`AMENT_PREFIX_PATH` and the environment of
             this Python), and the embedded store.
-        lock_file: Where sequential field numbers are kept; without it, numbers are hashes of the names.
+        lock_file: Where sequential field numbers are kept, which `rosidl-proto generate` has written and which is
+            only read here; without it, numbers are hashes of the names.
         events: Whether services have their `_Event` messages, as in code generated with `--events`.
 
     Raises:
@@ -142,7 +143,7 @@ class TypeRegistry:
     """
 
     def __init__(
-        self, catalog: Catalog | None = None, *, lock_file: Path | None = None, events: bool = False
+        self, catalog: Catalog | None = None, *, lock_file: Path | str | None = None, events: bool = False
     ) -> None:
         self._catalog = Catalog(tuple(installed_sources())) if catalog is None else catalog
         self._numbering = _numbering(lock_file)
@@ -153,7 +154,7 @@ class TypeRegistry:
 
     @classmethod
     def from_folders(
-        cls, *folders: Path | str, lock_file: Path | None = None, events: bool = False
+        cls, *folders: Path | str, lock_file: Path | str | None = None, events: bool = False
     ) -> TypeRegistry:
         """Return a registry of the packages in some folders; what they do not have is what is installed.
 
@@ -172,7 +173,7 @@ class TypeRegistry:
 
     @classmethod
     def from_texts(
-        cls, texts: Mapping[str, str], *, lock_file: Path | None = None, events: bool = False
+        cls, texts: Mapping[str, str], *, lock_file: Path | str | None = None, events: bool = False
     ) -> TypeRegistry:
         """Return a registry of types that are given as text; what the texts do not have is what is installed.
 
@@ -184,7 +185,16 @@ class TypeRegistry:
         Raises:
             DefinitionError: A name is not of the form `package/namespace/Name`.
             SchemaError: The lock file cannot be read or is damaged.
+            TypeError: The texts are no mapping, or one of them is no text.
         """
+        if not isinstance(texts, Mapping):
+            raise TypeError(
+                "texts must be a mapping from type names to definitions, such as "
+                f"{{'my_msgs/msg/Track': 'float64 x'}}, not {type(texts).__name__}"
+            )
+        for name, text in texts.items():
+            if not isinstance(text, str):
+                raise TypeError(f"the definition of {name!r} must be a text, not {type(text).__name__}")
         installed = Catalog(tuple(installed_sources()))
         given = text_source({_parsed(name): text for name, text in texts.items()})
         # Of a package, the texts may have some types only.
@@ -213,9 +223,10 @@ class TypeRegistry:
         Raises:
             DefinitionError: There is no such type (the message names similar ones), something that it refers to is
                 missing, or a definition is not valid.
-            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it.
+            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it or does not have it.
+            TypeError: The name is no text.
         """
-        type_name = name if isinstance(name, TypeName) else _parsed(name)
+        type_name = name if isinstance(name, TypeName) else _parsed(name, self._catalog)
         with self._lock:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._schema(type_name)
@@ -257,18 +268,26 @@ class TypeRegistry:
         return File(proto, file_descriptor(proto).SerializeToString(deterministic=True))
 
 
-def _numbering(lock_file: Path | None) -> Numbering:
+def _numbering(lock_file: Path | str | None) -> Numbering:
     if lock_file is None:
         return HashNumbering()
     try:
-        text = lock_file.read_text(encoding="utf-8")
+        text = Path(lock_file).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SchemaError(f"cannot read {lock_file}: {error}") from None
-    return SequentialNumbering.from_lock(str(lock_file), text)
+    return SequentialNumbering.from_lock(str(lock_file), text, is_complete=True)
 
 
-def _parsed(name: str) -> TypeName:
+def _parsed(name: str, catalog: Catalog | None = None) -> TypeName:
+    """Return the type of a name; of the short form `package/Name`, the error has what the catalog has of that name."""
+    if not isinstance(name, str):
+        raise TypeError(
+            f"the name of a type must be a text, such as 'sensor_msgs/msg/Imu', not {type(name).__name__}"
+        )
     try:
         return TypeName.parse(name)
     except ValueError as error:
-        raise DefinitionError(str(error)) from None
+        package, _, rest = name.partition("/")
+        known = catalog.packages.get(package, {}) if catalog else {}
+        full = " or ".join(str(each) for each in known if each.name == rest)
+        raise DefinitionError(f"{error}; did you mean {full}?" if full else str(error)) from None

@@ -127,7 +127,8 @@ class Transcoder(_core.Transcoder):
             ranges: Where in the buffer each message is: unsigned 64-bit numbers, as `array("Q")` and numpy have them,
                 for each message its first byte and the one after its last.
             into: Writable memory for all results, such as a `bytearray`; by default a new one of the exact size. It
-                cannot change its size during the call, and may not be memory of the messages.
+                may not be memory of the messages. It cannot change its size as long as the batch or one of its
+                results lives, and the next batch into it overwrites them.
 
         Returns:
             The results. Messages that are not valid do not fail the others.
