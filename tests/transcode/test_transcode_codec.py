@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import gc
+import inspect
 import itertools
 import pickle
 import sys
