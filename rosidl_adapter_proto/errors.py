@@ -58,8 +58,10 @@ class ConversionError(Error):
 def wrong_message(type_name: str, expected: str, found: object) -> ConversionError:
     """Return the error for an object that is not the protobuf message of a type."""
     found_class = type(found)
+    descriptor = getattr(found_class, "DESCRIPTOR", None)
+    other = " (of another version of the type)" if getattr(descriptor, "full_name", None) == expected else ""
     return ConversionError(
         type_name,
         "",
-        f"expected a protobuf message {expected}, not {found_class.__module__}.{found_class.__qualname__}",
+        f"expected a protobuf message {expected}, not {found_class.__module__}.{found_class.__qualname__}{other}",
     )

@@ -28,8 +28,8 @@ constexpr Range kNowhere = {UINT64_MAX, UINT64_MAX};
 constexpr uint64_t kBlockSize = 32 * 1024;
 constexpr size_t kBlockMessages = 256;
 
-// Calls `work(i)` for each i below `count`, in order of i, on up to `threads` threads, but on no more than the
-// machine runs at once: blocks wait for their turn. `work` does not throw.
+// Calls `work(i)` for each i below `count`, in order of i, on up to `threads` threads, but on no more than
+// the machine runs at once: blocks wait for their turn. `work` does not throw.
 template <class Work>
 void run_on_threads(size_t threads, size_t count, Work work) {
   std::atomic<size_t> next{0};

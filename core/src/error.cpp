@@ -1,5 +1,7 @@
 #include "rosidl_adapter_proto/error.hpp"
 
+#include <cstdlib>
+
 #include "text.hpp"
 
 namespace rosidl_proto {
@@ -159,8 +161,11 @@ std::string reason(const Error& error) {
       case 'v':
         text += visit(static_cast<CdrForm>(error.b), [](auto form) { return decltype(form)::kValues; });
         break;
-      default:
+      case 'e':
         text += encapsulation(error.a);
+        break;
+      default:
+        std::abort();  // a text above has a letter that nobody knows
     }
     p += 2;
   }

@@ -47,7 +47,10 @@ def adapter_for(type_name: str, registry: TypeRegistry | None = None) -> Any:
     Raises:
         DefinitionError: There is no such type, something that it refers to is missing, or a definition is not valid.
         SchemaError: A type cannot be mapped to protobuf.
+        TypeError: The name is no text, or the registry is none.
     """
+    if registry is not None and not isinstance(registry, TypeRegistry):
+        raise TypeError(f"registry must be a TypeRegistry, not {type(registry).__name__}")
     with _lock:
         if registry is None:
             registry = _default_registry()

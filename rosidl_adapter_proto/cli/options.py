@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
-from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.errors import Error, RequestError
 from rosidl_adapter_proto.generate import Options
 from rosidl_adapter_proto.generate.request import find_catalog
-from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Setting
+from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Setting, check_lock_file_is_used
 from rosidl_adapter_proto.interfaces import store
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -76,12 +77,22 @@ def generate_options(settings: Iterable[Setting]) -> Callable[[Callable[..., Any
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
         def with_options(**values: Any) -> Any:
-            return command(
-                options=Options.of({each.name: values.pop(each.attribute) for each in rows}), **values
-            )
+            options = Options.of({each.name: values.pop(each.attribute) for each in rows})
+            _check_lock_file(options)
+            return command(options=options, **values)
 
         for each in reversed(rows):
             with_options = setting_option(each.name)(with_options)
         return with_options
 
     return decorate
+
+
+def _check_lock_file(options: Options) -> None:
+    """Refuse a lock file on the command line that would be passed over; a configuration has been checked by itself."""
+    source = click.get_current_context().get_parameter_source("lock_file")
+    if source is ParameterSource.COMMANDLINE:
+        try:
+            check_lock_file_is_used(options.numbering)
+        except ValueError as error:
+            raise RequestError(f"--lock-file {error}") from None

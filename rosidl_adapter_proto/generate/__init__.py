@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rosidl_adapter_proto.generate.outputs import Progress
 from rosidl_adapter_proto.generate.request import Request
 from rosidl_adapter_proto.generate.run import Result, check_definitions, generate, proto_text
 from rosidl_adapter_proto.generate.settings import Options
+from rosidl_adapter_proto.generate.targets import Progress
 
 __all__ = (
     "Options",

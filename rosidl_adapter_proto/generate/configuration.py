@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import configparser
 import os
+import re
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from typing import Any
 
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.request import Request, find_request, is_path
-from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Options, Setting
+from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Options, Setting, check_lock_file_is_used
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 
 if sys.version_info >= (3, 11):
@@ -65,33 +66,45 @@ def read_configuration(folder: Path) -> Configuration | None:
     """Return the configuration in a folder: its pyproject.toml, or else its setup.cfg, if that has our section.
 
     Raises:
-        RequestError: A file cannot be read, or has a setting that does not exist or is of another kind.
+        RequestError: A file cannot be read, or has a section with nearly the name of ours, or a setting that does not
+            exist or is of another kind.
     """
     for name, read in (("pyproject.toml", _read_toml), ("setup.cfg", _read_ini)):
         file = folder / name
         if not os.path.isfile(file):
             continue
         try:
-            section = read(file.read_text(encoding="utf-8"))
+            names, section = read(file.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, configparser.Error) as error:
             raise RequestError(f"cannot read {file}: {error}") from None
+        for misspelt in (each for each in names if each != SECTION and _letters(each) == _letters(SECTION)):
+            raise RequestError(f"{file}: [{misspelt}] is not read; did you mean [{SECTION}]?")
         if section is not None:
             return Configuration(file, _values(section, file))
     return None
 
 
-def _read_toml(text: str) -> Any:
-    tools = tomllib.loads(text).get("tool", {})
-    return tools.get(SECTION.partition(".")[2]) if isinstance(tools, dict) else None
+def _letters(section: str) -> str:
+    """Return what is left of the name of a section if only the letters behind `tool` count."""
+    return re.sub("[^a-z]", "", section.lower()).removeprefix("tool")
 
 
-def _read_ini(text: str) -> Any:
-    """Return the section of a setup.cfg, with its strings as what they stand for."""
+def _read_toml(text: str) -> tuple[list[str], Any]:
+    """Return the names of all sections of a pyproject.toml, and ours."""
+    content = tomllib.loads(text)
+    tools = content.get("tool")
+    if not isinstance(tools, dict):
+        tools = {}
+    return [*content, *(f"tool.{name}" for name in tools)], tools.get(SECTION.partition(".")[2])
+
+
+def _read_ini(text: str) -> tuple[list[str], Any]:
+    """Return the names of all sections of a setup.cfg, and ours, with its strings as what they stand for."""
     parser = configparser.ConfigParser(interpolation=None)
     parser.read_string(text)
     if SECTION not in parser:
-        return None
-    return {
+        return parser.sections(), None
+    return parser.sections(), {
         name: SETTINGS[name].from_text(value) if name in SETTINGS else value
         for name, value in parser[SECTION].items()
     }
@@ -101,7 +114,7 @@ def _values(section: Any, file: Path) -> dict[str, Any]:
     """Return the values of a section; paths that are not set are beside the configuration, wherever the program runs.
 
     Raises:
-        RequestError: A setting does not exist or is of another kind.
+        RequestError: A setting does not exist, is of another kind, or has no use.
     """
     if not isinstance(section, dict):
         raise RequestError(f"{file}: [{SECTION}] must be a table")
@@ -114,6 +127,8 @@ def _values(section: Any, file: Path) -> dict[str, Any]:
             )
         try:
             SETTINGS[name].check(value)
+            if name == "lock-file":
+                check_lock_file_is_used(section.get("numbering", SETTINGS["numbering"].default))
         except ValueError as error:
             raise RequestError(f"{file}: [{SECTION}] {name} {error}") from None
         values[name] = _located(SETTINGS[name], value, file)

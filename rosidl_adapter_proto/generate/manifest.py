@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 from rosidl_adapter_proto.errors import GenerateError
@@ -82,8 +82,7 @@ def _parse(content: Any) -> Manifest:
         raise ValueError(f"it has version {content['version']}, not {_VERSION}")
     outputs = dict(content["outputs"])
     for path in outputs:
-        parts = PurePosixPath(path)
-        if not parts.parts or parts.is_absolute() or ".." in parts.parts:
+        if not {"", ".", ".."}.isdisjoint(path.split("/")):
             raise ValueError(f"it names {path!r}, which is not inside the folder")
     numbers = None if content["numbers"] is None else _parse_numbers(content["numbers"])
     interfaces = tuple(map(TypeName.parse, content["interfaces"]))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from rosidl_adapter_proto.generate.settings import Options
-from rosidl_adapter_proto.generate.targets import Files, Generation, index, project, proto, python
+from rosidl_adapter_proto.generate.targets import Files, Generation, Progress, index, project, proto, python
 from rosidl_adapter_proto.schema.proto import ProtoFile
 
 
@@ -50,10 +50,6 @@ SHARED_FOLDERS = {each.folder: each.place for each in OUTPUTS if each.place is n
 def places(python_folder: str) -> dict[str, str]:
     """Return where every folder of an output folder goes in a prefix with that folder of Python packages."""
     return {each.folder: python_folder if each.place is None else each.place for each in OUTPUTS}
-
-
-Progress = Callable[[int, int], None]
-"""Is told how many interfaces are done, and how many there are."""
 
 
 def all_files(generation: Generation, progress: Progress | None = None) -> dict[str, bytes]:

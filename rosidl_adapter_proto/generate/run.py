@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rosidl_adapter_proto.errors import GenerateError, SchemaError
-from rosidl_adapter_proto.generate import protoc
 from rosidl_adapter_proto.generate.fingerprint import fingerprint
 from rosidl_adapter_proto.generate.lock import check_numbers, read_lock, sequential_numbers, write_lock
 from rosidl_adapter_proto.generate.manifest import is_intact, read_manifest
@@ -21,10 +20,9 @@ from rosidl_adapter_proto.generate.output_tree import (
     make_manifest,
     write,
 )
-from rosidl_adapter_proto.generate.outputs import Progress, all_files
 from rosidl_adapter_proto.generate.request import Request
 from rosidl_adapter_proto.generate.settings import Options
-from rosidl_adapter_proto.generate.targets import Generation
+from rosidl_adapter_proto.generate.targets import Generation, Progress
 from rosidl_adapter_proto.generate.targets.proto import proto_text as render_proto
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.closure import closure
@@ -158,6 +156,10 @@ def _generate_files(
     progress: Progress | None,
 ) -> dict[str, bytes]:
     """Return the content of every file of the output folder, by its path."""
+    # They are slow to import, and a run with nothing to do does not need them.
+    from rosidl_adapter_proto.generate import protoc
+    from rosidl_adapter_proto.generate.outputs import all_files
+
     protos = _proto_files(names, request, catalog, options, numbering)
     texts = {file.path: render_proto(file) for file in protos}
     wanted = tuple(file for file in protos if _is_wanted(file.source.name, request))

@@ -110,7 +110,7 @@ class Options:
     )
     lock_file: Path = _option(
         Kind.PATH,
-        "Where sequential numbers are kept; commit it.",
+        "Where sequential numbers are kept; commit it. Only with sequential numbering.",
         default=Path(LOCK_FILE_NAME),
         is_for_schema=True,
         changes_output=False,  # what is in it does
@@ -141,6 +141,22 @@ class Options:
     def changing_output(self) -> dict[str, Any]:
         """Return the options that other files would be made with, by attribute."""
         return {each.attribute: getattr(self, each.attribute) for each in OPTIONS if each.changes_output}
+
+
+def check_lock_file_is_used(numbering: str) -> None:
+    """Check that there is a use for a lock file that was given: passing over it would make other numbers.
+
+    Args:
+        numbering: The numbering that it was given with.
+
+    Raises:
+        ValueError: That has no lock file.
+    """
+    if numbering != SequentialNumbering.name:
+        raise ValueError(
+            f"is for numbering {SequentialNumbering.name!r}, and numbering is {numbering!r}; "
+            "set that numbering as well, or leave the lock file out"
+        )
 
 
 OPTIONS = tuple(Setting(each.name.replace("_", "-"), **each.metadata) for each in dataclasses.fields(Options))

@@ -20,14 +20,14 @@ from pathlib import Path
 from typing import Any
 
 import rosidl_adapter_proto
-from rosidl_adapter_proto.errors import Error, GenerateError
+from rosidl_adapter_proto.errors import Error, GenerateError, RequestError
 from rosidl_adapter_proto.generate import Options, Request, check_definitions, generate
 from rosidl_adapter_proto.generate.lock import is_kept
 from rosidl_adapter_proto.generate.manifest import read_manifest
 from rosidl_adapter_proto.generate.output_tree import install
 from rosidl_adapter_proto.generate.outputs import places
 from rosidl_adapter_proto.generate.request import find_catalog
-from rosidl_adapter_proto.generate.settings import OPTIONS, Kind, Setting
+from rosidl_adapter_proto.generate.settings import OPTIONS, Kind, Setting, check_lock_file_is_used
 from rosidl_adapter_proto.generate.targets.index import (
     RESOURCE_FOLDER,
     generated_packages,
@@ -91,16 +91,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command of the hook, and return its exit code; errors go to the standard error, as compilers write them."""
     parser = _parser()
     given = parser.parse_args(arguments)
-    build = Build(
-        given.package,
-        tuple(given.interface),
-        tuple(given.dependency),
-        given.output,
-        _options(given),
-        given.prefix,
-        given.python_folder,
-    )
     try:
+        build = Build(
+            given.package,
+            tuple(given.interface),
+            tuple(given.dependency),
+            given.output,
+            _options(given),
+            given.prefix,
+            given.python_folder,
+        )
         COMMANDS[given.command](build)
     except Error as error:
         print(error, file=sys.stderr)
@@ -233,7 +233,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--dependency", action="append", type=Path, default=[])
     parser.add_argument("--output", type=Path, required=True)
     for each in OPTIONS:
-        parser.add_argument(f"--{each.name}", type=partial(_option_value, each), default=each.default)
+        parser.add_argument(f"--{each.name}", type=partial(_option_value, each), default=argparse.SUPPRESS)
     parser.add_argument("--folder", type=Path, default=Path())  # that paths of options are relative to
     parser.add_argument("--prefix", type=Path, default=Path())
     parser.add_argument("--python-folder", default="")
@@ -250,7 +250,17 @@ def _option_value(option: Setting, text: str) -> Any:
 
 
 def _options(given: argparse.Namespace) -> Options:
-    values = {each: getattr(given, each.attribute) for each in OPTIONS}
+    """Return how to generate.
+
+    Raises:
+        RequestError: A lock file was given that there is no use for.
+    """
+    values = {each: getattr(given, each.attribute, each.default) for each in OPTIONS}
+    if hasattr(given, "lock_file"):
+        try:
+            check_lock_file_is_used(getattr(given, "numbering", Options().numbering))
+        except ValueError as error:
+            raise RequestError(f"ROSIDL_PROTO_LOCK_FILE {error}") from None
     return Options.of(
         {
             each.name: given.folder / value if each.kind is Kind.PATH else value

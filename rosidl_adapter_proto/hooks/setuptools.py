@@ -47,9 +47,10 @@ def _project_folder() -> Path:
 def _mentions_us(file: Path) -> bool:
     """Tell whether to look closer: this runs in the builds of projects that know nothing of us."""
     try:
-        return b"rosidl-proto" in file.read_bytes()
+        text = file.read_bytes()
     except OSError:
         return False
+    return b"rosidl-proto" in text or b"[tool.rosidl_proto]" in text  # misspelt, which is an error
 
 
 def _build_py(base: type[build_py], folder: Path) -> type[build_py]:

@@ -147,7 +147,8 @@ class Catalog:
 
     def places(self) -> str:
         """Say where was looked."""
-        return "looked in " + ", ".join(source.origin for source in self.sources)
+        places = (f"{each.origin} ({each.limit})" if each.limit else each.origin for each in self.sources)
+        return "looked in " + ", ".join(places)
 
 
 def _is_same(one: Definition, other: Definition) -> bool:

@@ -118,11 +118,13 @@ class Source:
         origin: What it is, for people.
         packages: The definitions of each package.
         stands_in: Whether it only stands in for packages that are nowhere else.
+        limit: What it can have at all, for people; empty if that is everything.
     """
 
     origin: str
     packages: Mapping[str, Package]
     stands_in: bool = False
+    limit: str = ""
 
 
 def folder_source(folder: Path) -> Source:
@@ -263,7 +265,7 @@ def store_source(distribution: str | None = None) -> Source:
     else:
         store.check_distribution(distribution)
     origin = f"embedded store {distribution}"
-    return Source(origin, _StorePackages(distribution, origin), stands_in=True)
+    return Source(origin, _StorePackages(distribution, origin), stands_in=True, limit="messages only")
 
 
 class _StorePackages(Mapping[str, Package]):
@@ -394,14 +396,14 @@ def _read_package(folder: Path, name: str, origin: str) -> Package:
 
 
 def _files(folder: Path, seen: set[str]) -> Iterator[Path]:
-    """Yield what is in a package folder at any depth; other packages and what is for tests are none of it."""
+    """Yield what may be a definition in a package folder at any depth; other packages and tests are none of it."""
     for each in _entries(folder, seen):
-        path = Path(each.path)
-        yield path
+        if each.name.endswith(SUFFIXES):
+            yield Path(each.path)
         if not os.path.isdir(each) or each.name.startswith(".") or each.name in _TEST_FOLDERS:
             continue
-        if not any(os.path.isfile(path / marker) for marker in _FOREIGN_MARKERS):
-            yield from _files(path, seen)
+        if not any(os.path.isfile(os.path.join(each.path, marker)) for marker in _FOREIGN_MARKERS):
+            yield from _files(Path(each.path), seen)
 
 
 def _definitions(files: Iterable[tuple[TypeName, str]], origin: str) -> dict[TypeName, Definition]:

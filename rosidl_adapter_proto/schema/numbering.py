@@ -104,18 +104,20 @@ class SequentialNumbering:
         file: The path of the lock file, for messages.
         messages: Its content, by type name; `numbers` brings it up to date.
         given: The numbers of each message that was asked for, those of removed fields included.
+        is_complete: Whether the lock file has every field, so that none gets a new number.
     """
 
     name = "sequential"
 
-    def __init__(self, file: str, messages: dict[str, LockedMessage]) -> None:
+    def __init__(self, file: str, messages: dict[str, LockedMessage], *, is_complete: bool = False) -> None:
         self.file = file
         self.messages = messages
         self.given: dict[str, dict[str, int]] = {}
+        self.is_complete = is_complete
 
     @classmethod
-    def from_lock(cls, file: str, text: str | None) -> SequentialNumbering:
-        """Read a lock file; `text` is None where there is none yet.
+    def from_lock(cls, file: str, text: str | None, *, is_complete: bool = False) -> SequentialNumbering:
+        """Read a lock file; `text` is None where there is none yet, and `is_complete` as for a numbering.
 
         Raises:
             SchemaError: The file is damaged.
@@ -125,8 +127,9 @@ class SequentialNumbering:
         try:
             content = json.loads(text, object_pairs_hook=_unique)
             if content["version"] not in _READ_VERSIONS:
+                known = " and ".join(map(str, _READ_VERSIONS))
                 raise SchemaError(
-                    f"{file} has version {content['version']}, this program reads {' and '.join(map(str, _READ_VERSIONS))}; "
+                    f"{file} has version {content['version']}, this program reads {known}; "
                     "use the version of rosidl-proto that wrote it, or a newer one"
                 )
             messages = {
@@ -141,13 +144,14 @@ class SequentialNumbering:
             raise _damaged(file, str(error)) from None
         for name, message in messages.items():
             _check_numbers(file, name, message)
-        return cls(file, messages)
+        return cls(file, messages, is_complete=is_complete)
 
     def numbers(self, message: Message) -> Numbers:
         """Return the number of every field; new fields take the next numbers that were never used.
 
         Raises:
-            SchemaError: A field would reuse a number for values of another type.
+            SchemaError: A field would reuse a number for values of another type, or needs a new one where the lock
+                file is complete.
         """
         locked = self.messages.setdefault(str(message.name), LockedMessage())
         present = {
@@ -162,6 +166,12 @@ class SequentialNumbering:
             if name in locked.removed:
                 locked.fields[name] = locked.removed.pop(name)
         used = {each.number for each in (*locked.fields.values(), *locked.removed.values())}
+        new = [name for name in present if name not in locked.fields]
+        if new and self.is_complete:
+            raise SchemaError(
+                f"{message.name}.{new[0]}: {self.file} has no number for it; generate code of {message.name} with "
+                "this lock file first"
+            )
         for name, types in present.items():
             number = locked.fields[name].number if name in locked.fields else _next_number(used)
             locked.fields[name] = LockedField(number, *types)

@@ -153,7 +153,8 @@ class TypeRegistry:
     Args:
         catalog: Where definitions come from: by default what is installed (`AMENT_PREFIX_PATH` and the environment of
             this Python), and the embedded store.
-        lock_file: Where sequential field numbers are kept; without it, numbers are hashes of the names.
+        lock_file: Where sequential field numbers are kept, which `rosidl-proto generate` has written and which is
+            only read here; without it, numbers are hashes of the names.
         events: Whether services have their `_Event` messages, as in code generated with `--events`.
         python_root: The namespace package of generated code, as in code generated with `--python-root`.
 
@@ -166,7 +167,7 @@ class TypeRegistry:
         self,
         catalog: Catalog | None = None,
         *,
-        lock_file: Path | None = None,
+        lock_file: Path | str | None = None,
         events: bool = False,
         python_root: str = DEFAULT_PYTHON_ROOT,
     ) -> None:
@@ -186,7 +187,7 @@ class TypeRegistry:
     def from_folders(
         cls,
         *folders: Path | str,
-        lock_file: Path | None = None,
+        lock_file: Path | str | None = None,
         events: bool = False,
         python_root: str = DEFAULT_PYTHON_ROOT,
     ) -> TypeRegistry:
@@ -211,7 +212,7 @@ class TypeRegistry:
         cls,
         texts: Mapping[str, str],
         *,
-        lock_file: Path | None = None,
+        lock_file: Path | str | None = None,
         events: bool = False,
         python_root: str = DEFAULT_PYTHON_ROOT,
     ) -> TypeRegistry:
@@ -226,11 +227,16 @@ class TypeRegistry:
         Raises:
             DefinitionError: A name is not of the form `package/namespace/Name`.
             SchemaError: The lock file cannot be read or is damaged.
-            TypeError: A name or definition is no text.
+            TypeError: The texts are no mapping, or one of them is no text.
         """
+        if not isinstance(texts, Mapping):
+            raise TypeError(
+                "texts must be a mapping from type names to definitions, such as "
+                f"{{'my_msgs/msg/Track': 'float64 x'}}, not {type(texts).__name__}"
+            )
         for name, text in texts.items():
             if not isinstance(text, str):
-                raise TypeError(f"the definition of {name} has to be a str, not {type(text).__name__}")
+                raise TypeError(f"the definition of {name!r} must be a text, not {type(text).__name__}")
         installed = Catalog(tuple(installed_sources()))
         given = text_source({_parsed(name): text for name, text in texts.items()})
         # Of a package, the texts may have some types only.
@@ -259,10 +265,10 @@ class TypeRegistry:
         Raises:
             DefinitionError: There is no such type (the message names similar ones), something that it refers to is
                 missing, or a definition is not valid.
-            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it.
+            SchemaError: A type cannot be mapped to protobuf, or the lock file disagrees with it or does not have it.
             TypeError: The name is no text.
         """
-        type_name = name if isinstance(name, TypeName) else _parsed(name)
+        type_name = name if isinstance(name, TypeName) else _parsed(name, self._catalog)
         with self._lock:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._schema(type_name)
@@ -411,15 +417,17 @@ class TypeRegistry:
         return File(proto, file_descriptor(proto).SerializeToString(deterministic=True))
 
 
-def _lock_text(lock_file: Path) -> str:
+def _lock_text(lock_file: Path | str) -> str:
     try:
-        return lock_file.read_text(encoding="utf-8")
+        return Path(lock_file).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SchemaError(f"cannot read {lock_file}: {error}") from None
 
 
-def _numbering(lock_file: Path | None, text: str | None) -> Numbering:
-    return HashNumbering() if text is None else SequentialNumbering.from_lock(str(lock_file), text)
+def _numbering(lock_file: Path | str | None, text: str | None) -> Numbering:
+    if text is None:
+        return HashNumbering()
+    return SequentialNumbering.from_lock(str(lock_file), text, is_complete=True)
 
 
 @lru_cache(maxsize=1)
@@ -435,10 +443,16 @@ def _text(definition: Definition) -> str:
         return str(error)
 
 
-def _parsed(name: str) -> TypeName:
+def _parsed(name: str, catalog: Catalog | None = None) -> TypeName:
+    """Return the type of a name; of the short form `package/Name`, the error has what the catalog has of that name."""
     if not isinstance(name, str):
-        raise TypeError(f"the name of a type has to be a str such as 'std_msgs/msg/Header', not {name!r}")
+        raise TypeError(
+            f"the name of a type must be a text, such as 'sensor_msgs/msg/Imu', not {type(name).__name__}"
+        )
     try:
         return TypeName.parse(name)
     except ValueError as error:
-        raise DefinitionError(str(error)) from None
+        package, _, rest = name.partition("/")
+        known = catalog.packages.get(package, {}) if catalog else {}
+        full = " or ".join(str(each) for each in known if each.name == rest)
+        raise DefinitionError(f"{error}; did you mean {full}?" if full else str(error)) from None

@@ -6,6 +6,7 @@ The work is done by methods of the native module, which `_core.pyi` describes; t
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -41,7 +42,7 @@ class Batch:
         buffer: The results, one after the other.
         ranges: Where in the buffer they are: the first byte and the one after the last of each, in one row of
             unsigned 64-bit numbers. A message that failed has `NOWHERE` twice. With the buffer they can be given to
-            another batch.
+            another batch, if none failed.
         errors: The error of each message that failed, by its index.
     """
 
@@ -126,7 +127,8 @@ class Transcoder(_core.Transcoder):
             ranges: Where in the buffer each message is: unsigned 64-bit numbers, as `array("Q")` and numpy have them,
                 for each message its first byte and the one after its last.
             into: Writable memory for all results, such as a `bytearray`; by default a new one of the exact size. It
-                cannot change its size during the call, and may not be memory of the messages.
+                may not be memory of the messages. It cannot change its size as long as the batch or one of its
+                results lives, and the next batch into it overwrites them.
 
         Returns:
             The results. Messages that are not valid do not fail the others.
@@ -158,9 +160,10 @@ def _batch(
     into: Buffer | None,
 ) -> Batch:
     """Call a native method, and wrap what it returns."""
-    if operator.index(threads) < 1:
+    threads = operator.index(threads)
+    if threads < 1:
         raise ValueError("threads must be 1 or more")
-    buffer, size, places, errors = transcode(messages, ranges, threads, into)
+    buffer, size, places, errors = transcode(messages, ranges, min(threads, sys.maxsize), into)
     return Batch(memoryview(buffer).cast("B")[:size], memoryview(places).cast("Q"), errors)
 
 

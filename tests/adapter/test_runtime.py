@@ -113,6 +113,16 @@ def test_types_that_cannot_be_had(name: str, text: str) -> None:
     assert text in str(caught.value)
 
 
+def test_arguments_of_another_kind() -> None:
+    for arguments, text in (
+        ((5,), "the name of a type must be a text, such as 'sensor_msgs/msg/Imu', not int"),
+        (("std_msgs/msg/Header", {}), "registry must be a TypeRegistry, not dict"),
+    ):
+        with pytest.raises(TypeError) as caught:
+            adapter_for(*arguments)
+        assert str(caught.value) == text
+
+
 def test_registries_have_adapters_of_their_own() -> None:
     """A hash knows nothing of constants and default values: two definitions with one class can have others."""
     name = "runtime_registries/msg/Track"
@@ -163,8 +173,17 @@ def test_versions_of_a_type_side_by_side(generated_things: SimpleNamespace) -> N
     assert made.custom_type is not generated.custom_type
     assert made.from_cdr(made.to_cdr(made.custom_type(y="a"))).y == "a"
     assert generated.from_cdr(generated.to_cdr(generated.custom_type(x=1))).x == 1
-    with pytest.raises(ConversionError, match=r"^things/msg/Part: expected a protobuf message "):
-        made.to_cdr(generated.custom_type(x=1))
+    for refuse in (made.to_cdr, made.convert_to_ros_message):
+        with pytest.raises(ConversionError) as caught:
+            refuse(generated.custom_type(x=1))
+        found = f"{generated.custom_type.__module__}.Part"
+        assert str(caught.value) == (
+            f"things/msg/Part: expected a protobuf message things.msg.pb.Part, not {found} "
+            "(of another version of the type)"
+        )
+    with pytest.raises(ConversionError) as caught:
+        made.to_cdr(made.custom_type)
+    assert "another version" not in str(caught.value)
 
 
 def test_types_that_cannot_be_transcoded(tmp_path: Path) -> None:

@@ -206,7 +206,8 @@ from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 source, output, package, *distributions = sys.argv[1:]
 catalog = Catalog((folder_source(Path(source)), *map(store_source, distributions)))
 print(generate(Request((package,)), catalog, Path(output)).is_stale)
-print([name for name in ("jinja2", "black", "grpc_tools", "lark", "rosbags", "click") if name in sys.modules])
+slow = ("jinja2", "black", "grpc_tools", "lark", "rosbags", "click", "google.protobuf", "rosidl_adapter_proto.adapter")
+print([name for name in slow if name in sys.modules])
 """
 
 

@@ -247,7 +247,7 @@ def test_a_folder_that_cannot_be_written(
             "no_msgs/Such x\n",
             "no_msgs/msg/Such was not found, but track_msgs/msg/Track.x ({file}:1:14) needs it; "
             "did you mean nav_msgs or sensor_msgs or tf2_msgs?\n"
-            "looked in package track_msgs, {folder}/ros/share/std_msgs, embedded store lyrical\n",
+            "looked in package track_msgs, {folder}/ros/share/std_msgs, embedded store lyrical (messages only)\n",
         ),
     ],
 )

@@ -58,6 +58,11 @@ def test_settings_that_are_wrong(project: Path) -> None:
         "error: rosidl-proto: setup.cfg: [tool.rosidl-proto] names nothing to generate; set `packages`"
         in setup(project, "build", code=1).replace(f"{project}/", "")
     )
+    (project / "setup.cfg").write_text("[tool.rosidl_proto]\npackages = std_msgs\n")
+    assert (
+        "error: rosidl-proto: setup.cfg: [tool.rosidl_proto] is not read; did you mean [tool.rosidl-proto]?"
+        in setup(project, "build", code=1).replace(f"{project}/", "")
+    )
 
 
 def test_build_and_source_distribution(project: Path) -> None:

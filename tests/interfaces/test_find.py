@@ -809,5 +809,5 @@ def test_packages_before_the_store(tmp_path: Path) -> None:
     )
     assert error_of(catalog.package, "std_msg") == (
         f"package 'std_msg' was not found; did you mean std_msgs or tf2_msgs or stereo_msgs?; "
-        f"looked in {tmp_path}, embedded store kilted"
+        f"looked in {tmp_path}, embedded store kilted (messages only)"
     )

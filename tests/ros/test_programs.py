@@ -111,13 +111,17 @@ def test_without_rclpy() -> None:
     assert "source a ROS 2 installation, or install it with pip" in result.stderr
 
 
-def test_the_page(ros: None, generated: Path) -> None:
-    """Every block of Python of the page, run one after the other in one program."""
+def test_the_page(ros: None, tmp_path: Path) -> None:
+    """Every block of Python of the page, run one after the other in one program, with what the page generates."""
+    command = re.search(r"^rosidl-proto (generate .* --output generated)$", PAGE.read_text(), re.MULTILINE)
+    assert command
+    program = [sys.executable, "-m", "rosidl_adapter_proto", *command[1].split()]
+    subprocess.run(program, cwd=tmp_path, check=True, capture_output=True)
     blocks = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(), re.DOTALL | re.MULTILINE)
     assert len(blocks) > 5
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", "\n".join(blocks)],
-        env=environment(generated),
+        env=environment(tmp_path / "generated" / "python"),
         capture_output=True,
         text=True,
         timeout=SECONDS,

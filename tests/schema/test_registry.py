@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import fnmatch
 import gc
+import json
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -173,18 +174,6 @@ def test_names_in_a_registry() -> None:
     assert TypeName("registry_names", "srv", "Set") in registry
 
 
-def test_arguments_that_are_no_text() -> None:
-    unnamed: Any = 5
-    with pytest.raises(TypeError) as caught:
-        TypeRegistry()[unnamed]
-    assert str(caught.value) == "the name of a type has to be a str such as 'std_msgs/msg/Header', not 5"
-    for text, kind in ((5, "int"), (b"int8 x", "bytes")):
-        texts: Any = {"registry_no_text/msg/A": text}
-        with pytest.raises(TypeError) as caught:
-            TypeRegistry.from_texts(texts)
-        assert str(caught.value) == f"the definition of registry_no_text/msg/A has to be a str, not {kind}"
-
-
 @pytest.mark.parametrize(
     ("name", "error"),
     [
@@ -198,6 +187,12 @@ def test_arguments_that_are_no_text() -> None:
             "package 'registry_unknwon' was not found; did you mean registry_unknown?; *",
         ),
         ("Track", "'Track' is not of the form package/namespace/Name"),
+        (
+            "registry_unknown/Track",
+            "'registry_unknown/Track' is not of the form package/namespace/Name; "
+            "did you mean registry_unknown/msg/Track?",
+        ),
+        ("registry_unknown/Trak", "'registry_unknown/Trak' is not of the form package/namespace/Name"),
         (
             "registry_unknown/msg/Needy",
             "registry_lost/msg/A was not found, but registry_unknown/msg/Needy.a (*",
@@ -243,6 +238,27 @@ def test_names_that_texts_cannot_have(name: str, error: str) -> None:
     assert str(caught.value) == error
 
 
+@pytest.mark.parametrize(
+    ("texts", "error"),
+    [
+        (
+            "float64 x",
+            "texts must be a mapping from type names to definitions, such as "
+            "{'my_msgs/msg/Track': 'float64 x'}, not str",
+        ),
+        (
+            {"registry_kind/msg/Track": b"float64 x"},
+            "the definition of 'registry_kind/msg/Track' must be a text, not bytes",
+        ),
+        ({5: "float64 x"}, "the name of a type must be a text, such as 'sensor_msgs/msg/Imu', not int"),
+    ],
+)
+def test_texts_of_another_kind(texts: Any, error: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        TypeRegistry.from_texts(texts)
+    assert str(caught.value) == error
+
+
 def test_two_interfaces_that_define_the_same_name(tmp_path: Path) -> None:
     idl = "module registry_twice { module srv { struct Do_Request { long x; }; }; };"
     package = write_package(tmp_path / "registry_twice", {"srv/Do.srv": "---", "srv/Do_Request.idl": idl})
@@ -263,13 +279,29 @@ def test_numbers_of_a_lock_file(tmp_path: Path) -> None:
     numbering.numbers(generated.message(TypeName("registry_lock", "msg", "A")))
     lock.write_text(numbering.lock_text())
 
-    texts = {"registry_lock/msg/A": "int8 a\nint8 b\nint8 new", "registry_lock/msg/B": "int8 x\nint8 y"}
-    registry = TypeRegistry.from_texts(texts, lock_file=lock)
-    assert numbers(registry["registry_lock/msg/A"]) == {"a": 3, "b": 2, "new": 4}
-    assert numbers(registry["registry_lock/msg/B"]) == {"x": 1, "y": 2}
+    texts = {"registry_lock/msg/A": "int8 a\nint8 b"}
+    for file in (lock, str(lock)):
+        registry = TypeRegistry.from_texts(texts, lock_file=file)
+        assert numbers(registry["registry_lock/msg/A"]) == {"a": 3, "b": 2}
     assert lock.read_text() == numbering.lock_text()
     with pytest.raises(SchemaError, match=r"^registry_lock/msg/A\.a: .* has number 3 for it with type int8"):
         TypeRegistry.from_texts({"registry_lock/msg/A": "string a"}, lock_file=lock)["registry_lock/msg/A"]
+
+
+def test_fields_that_a_lock_file_does_not_have(tmp_path: Path) -> None:
+    """A number that nothing keeps would be another one in the next program."""
+    lock = tmp_path / "rosidl-proto.lock"
+    content = {"registry_new/msg/A": {"fields": {"a": "1 int32 (int8)"}, "removed": {}}}
+    lock.write_text(json.dumps({"version": 2, "messages": content}))
+    texts = {"registry_new/msg/A": "int8 a\nint8 new", "registry_new/msg/B": "int8 x"}
+    registry = TypeRegistry.from_texts(texts, lock_file=lock)
+    for name, field in (("registry_new/msg/A", "new"), ("registry_new/msg/B", "x")):
+        for _ in range(2):
+            with pytest.raises(SchemaError) as caught:
+                _ = registry[name]
+            assert str(caught.value) == (
+                f"{name}.{field}: {lock} has no number for it; generate code of {name} with this lock file first"
+            )
 
 
 def test_lock_files_that_cannot_be_read(tmp_path: Path) -> None:

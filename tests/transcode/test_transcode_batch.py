@@ -61,7 +61,7 @@ def outcomes(batch: Batch) -> list[bytes | str]:
     return result
 
 
-@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("threads", [1, 2, 5, 2**64])
 @pytest.mark.parametrize("count", [0, 1, 64, 300])
 def test_batch(count: int, threads: int) -> None:
     transcode, _ = transcoder(NASTY, "test/msg/Nasty")

@@ -23,9 +23,11 @@ def command() -> None:
 def drop_command(names: tuple[str, ...], lock_file: Path) -> None:
     """Forget numbers that were never released.
 
-    NAME is a field, as it is or was (my_msgs/msg/Track.id), or a message (my_msgs/msg/Track). The number can then be
-    given to another field, and the name another number.
+    NAME is a field, as it is or was (my_msgs/msg/Track.id), or a message (my_msgs/msg/Track). Its
+    entry is gone: the name gets the number after the highest one, and may have another type. A folder generated before
+    needs --renumber once.
     """
     options = Options(numbering=SequentialNumbering.name, lock_file=lock_file)
     for name, number in drop(options, names).items():
         click.echo(f"dropped {name}, which had number {number}")
+    click.echo("a folder generated before needs --renumber once")

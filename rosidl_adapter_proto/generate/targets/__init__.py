@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.generate.request import Request
@@ -12,6 +12,9 @@ from rosidl_adapter_proto.schema.proto import ProtoFile
 
 Files = Mapping[str, bytes]
 """The content of files by their paths, with slashes."""
+
+Progress = Callable[[int, int], None]
+"""Is told how many interfaces are done, and how many there are."""
 
 
 @dataclass(frozen=True)
