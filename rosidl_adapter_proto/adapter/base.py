@@ -225,8 +225,13 @@ class TypeAdapter(LazyAttributes, Generic[CustomT, RosT]):
 
 
 def copy_message(source: Message, destination: Message) -> None:
-    """Overwrite a protobuf message with another, which may have a field called `CopyFrom`."""
-    type(destination).CopyFrom(destination, source)
+    """Overwrite a protobuf message with another, which may have fields called like its methods.
+
+    `CopyFrom` of protobuf before 4.22 is written in Python, and calls the other two on the message.
+    """
+    if destination is not source:
+        type(destination).Clear(destination)
+        type(destination).MergeFrom(destination, source)
 
 
 # type_description_interfaces/msg/FieldType
