@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rosidl_adapter_proto.adapter.runtime import adapter_for
     from rosidl_adapter_proto.errors import (
+        BagError,
         ConversionError,
+        ConverterError,
         DefinitionError,
         Error,
         GenerateError,
@@ -37,7 +39,9 @@ __all__ = [
     "PROTO_ACTION_SEND_GOAL_CALL_NAME",
     "PROTO_PACKAGE_POSTFIX",
     "PROTO_SERVICE_CALL_NAME",
+    "BagError",
     "ConversionError",
+    "ConverterError",
     "DefinitionError",
     "Error",
     "GenerateError",

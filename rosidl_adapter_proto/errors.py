@@ -28,6 +28,14 @@ class GenerateError(Error):
     """Files cannot be generated or written."""
 
 
+class ConverterError(Error):
+    """There is no converter for a serialization format, or what brings one is wrong."""
+
+
+class BagError(Error):
+    """A bag cannot be read, converted or written."""
+
+
 class ConversionError(Error):
     """A value does not fit the type on the other side.
 

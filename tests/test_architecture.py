@@ -16,6 +16,8 @@ FLOORS = {
     "adapter": 4,
     "generate": 5,
     "ros": 5,
+    "converters": 5,
+    "bags": 6,
     "hooks": 7,
     "cli": 8,
     "time": 1,

@@ -1,0 +1,1 @@
+"""Bags: what ROS recorded, read, converted and written, with no ROS installed."""

@@ -1,0 +1,99 @@
+"""What every storage can do: one file of a recording is read by a reader, and written by a writer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+MAXIMUM_CHUNK_SIZE = 2**32 - 1
+"""The largest chunk that is read, in bytes: what a file says is not believed before memory is taken for it."""
+
+
+class StorageReader(Protocol):
+    """One file of a recording, open for reading. It is a context manager that closes the file.
+
+    Attributes:
+        path: The file, for people.
+        storage: The name of the storage in rosbag2, such as `mcap`.
+        topics: The topics by the ids that messages in the chunks have.
+        statistics: What the storage itself says of how much it has: for a file without a summary, counted.
+        attachments: The files inside it, which are few.
+        metadata: Whatever else the storage keeps, by name, such as what rosbag2 and a recorder wrote about the bag.
+        warnings: What is odd about the file, for people, such as that it has no summary.
+    """
+
+    path: str
+    storage: str
+    topics: Mapping[int, Topic]
+    statistics: Statistics
+    metadata: Sequence[tuple[str, Mapping[str, str]]]
+    warnings: Sequence[str]
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the files inside it, one at a time, since they may be large."""
+
+    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+        """Yield the chunks that may have messages of a selection, in the order of the file.
+
+        A chunk may have other messages as well: `_core.read_records` and `_core.RecordConverter` leave them out.
+
+        Raises:
+            BagError: The file is damaged; the message says where.
+        """
+
+    def __enter__(self) -> StorageReader: ...
+    def __exit__(self, *exception: object) -> None: ...
+
+
+class StorageWriter(Protocol):
+    """One file of a recording, open for writing. It is a context manager that closes the file, finished or not.
+
+    Attributes:
+        path: The file, for people.
+        storage: The name of the storage in rosbag2, such as `mcap`.
+        statistics: What was written so far.
+    """
+
+    path: str
+    storage: str
+
+    @property
+    def statistics(self) -> Statistics: ...
+
+    def add_topic(self, topic: Topic, topic_id: int | None = None) -> int:
+        """Add a topic, and return the id that its messages in the chunks must have: by default the next one."""
+
+    def pack(self, records: Buffer) -> PackedChunk:
+        """Return a chunk ready to be written: indexed and compressed. It may be called on any thread.
+
+        Args:
+            records: Messages as `_core.RecordConverter` or `_core.pack_records` made them.
+        """
+
+    def write(self, chunk: PackedChunk) -> None:
+        """Write a chunk, on the thread of the file."""
+
+    def add_attachment(self, attachment: Attachment) -> None:
+        """Write a file; a storage that has no room for them says so with a BagError."""
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """Write whatever else the storage keeps by name; a storage without room for it says so with a BagError."""
+
+    def finish(self) -> None:
+        """Write what belongs at the end of the file, and close it."""
+
+    def __enter__(self) -> StorageWriter: ...
+    def __exit__(self, *exception: object) -> None: ...
+
+
+class PackedChunk(Protocol):
+    """What `StorageWriter.pack` returns: only the writer that made it knows what it is."""
+
+    @property
+    def message_count(self) -> int:
+        """How many messages it has."""
