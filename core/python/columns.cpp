@@ -16,8 +16,11 @@ namespace {
 // Fills columns with messages of one type; one thread at a time does.
 class ColumnFiller {
  public:
-  ColumnFiller(nb::handle_t<Transcoder> transcoder, nb::bytes layout)
-      : owner_(nb::borrow(transcoder)), transcoder_(object_of<Transcoder>(transcoder.ptr())) {
+  ColumnFiller(nb::handle_t<Transcoder> transcoder, nb::bytes layout, uint8_t serialization)
+      : serialization_(static_cast<Serialization>(serialization)),
+        owner_(nb::borrow(transcoder)),
+        transcoder_(object_of<Transcoder>(transcoder.ptr())) {
+    if (serialization >= kSerializations) throw nb::value_error("there is no such serialization");
     const char* const wrong =
         columns_.load(transcoder_.plan(), static_cast<const uint8_t*>(layout.data()), layout.size());
     if (wrong != nullptr) throw nb::value_error(wrong);
@@ -27,7 +30,7 @@ class ColumnFiller {
 
   // Appends messages from `first` on until there are so many rows or bytes; returns the index of the next
   // message.
-  size_t append(nb::handle messages, nb::handle ranges, size_t first, bool protobuf, uint64_t maximum_rows,
+  size_t append(nb::handle messages, nb::handle ranges, size_t first, uint64_t maximum_rows,
                 uint64_t maximum_bytes) {
     std::optional<Buffer> whole;
     std::optional<HeldMessages> held;
@@ -39,7 +42,6 @@ class ColumnFiller {
       held.emplace(messages, "messages must be a sequence of messages");
     }
     const std::vector<Input>& inputs = held ? held->inputs() : places;
-    const Serialization serialization = protobuf ? Serialization::Protobuf : Serialization::Cdr;
     Error error;
     size_t next = first;
     bool good = true;
@@ -47,7 +49,7 @@ class ColumnFiller {
       nb::gil_scoped_release release;
       const std::lock_guard<std::mutex> lock(mutex_);
       while (next < inputs.size() && columns_.rows() < maximum_rows && columns_.bytes() < maximum_bytes) {
-        good = columns_.append(serialization, inputs[next], error);
+        good = columns_.append(serialization_, inputs[next], error);
         if (!good) break;
         ++next;
       }
@@ -77,6 +79,7 @@ class ColumnFiller {
   }
 
  private:
+  const Serialization serialization_;
   nb::object owner_;
   const Transcoder& transcoder_;  // of the owner
   std::mutex mutex_;
@@ -87,10 +90,11 @@ class ColumnFiller {
 
 void define_columns(nb::module_& module) {
   nb::class_<ColumnFiller>(module, "ColumnFiller")
-      .def(nb::init<nb::handle_t<Transcoder>, nb::bytes>(), nb::arg("transcoder"), nb::arg("layout"))
+      .def(nb::init<nb::handle_t<Transcoder>, nb::bytes, uint8_t>(), nb::arg("transcoder"), nb::arg("layout"),
+           nb::arg("serialization"))
       .def_prop_ro("rows", &ColumnFiller::rows, "How many messages the columns have.")
       .def("append", &ColumnFiller::append, nb::arg("messages"), nb::arg("ranges").none(), nb::arg("first"),
-           nb::arg("protobuf"), nb::arg("maximum_rows"), nb::arg("maximum_bytes"))
+           nb::arg("maximum_rows"), nb::arg("maximum_bytes"))
       .def("take", &ColumnFiller::take);
 }
 

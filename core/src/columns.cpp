@@ -158,6 +158,8 @@ bool Columns::append(Serialization serialization, Input message, Error& error) n
 }
 
 bool Columns::run(Serialization serialization, Input message, Error& error) {
+  uint8_t nothing;
+  if (message.size == 0) message.data = &nothing;  // a place that is nowhere is an error
   const ColumnSink sink(&capacity_);
   Column* at = columns_.data();
   switch (serialization) {
@@ -167,6 +169,8 @@ bool Columns::run(Serialization serialization, Input message, Error& error) {
       return swapped ? CdrReader<true, true, ColumnSink>(*plan_, message, sink, error).run(&at)
                      : CdrReader<false, true, ColumnSink>(*plan_, message, sink, error).run(&at);
     }
+    case Serialization::Ros1:
+      return CdrReader<false, true, ColumnSink, Ros1>(*plan_, message, sink, error).run(&at);
     case Serialization::Protobuf:
       if (message.size > kMaximumSize) {
         error.reason = Reason::WireSize;

@@ -81,6 +81,9 @@ class Transcoder:
     def proto_to_cdr(self, data: Buffer, /) -> bytes:
         """Turn a serialized protobuf message into a serialized ROS message."""
 
+    def ros1_to_proto(self, data: Buffer, /) -> bytes:
+        """Turn a message serialized by ROS 1 into a serialized protobuf message."""
+
     def _cdr_to_proto_batch(
         self, messages: Iterable[Buffer] | Buffer, ranges: Buffer | None, threads: int, into: Buffer | None, /
     ) -> tuple[Buffer, int, bytes, dict[int, TranscodeError]]:
@@ -92,8 +95,8 @@ class Transcoder:
         """Return the same for the other direction."""
 
 class ColumnFiller:
-    def __init__(self, transcoder: Transcoder, layout: bytes) -> None:
-        """Take a type and its columns, as `columns.pack_layout` packs them."""
+    def __init__(self, transcoder: Transcoder, layout: bytes, serialization: int) -> None:
+        """Take a type, its columns as `columns.pack_layout` packs them, and the place in `columns.SERIALIZATIONS`."""
 
     @property
     def rows(self) -> int:
@@ -104,7 +107,6 @@ class ColumnFiller:
         messages: Sequence[Buffer] | Buffer,
         ranges: Buffer | None,
         first: int,
-        protobuf: bool,
         maximum_rows: int,
         maximum_bytes: int,
     ) -> int:

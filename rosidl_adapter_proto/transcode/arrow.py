@@ -13,7 +13,14 @@ from rosidl_adapter_proto.interfaces.scalars import CdrForm
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.transcode import _core
 from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE
-from rosidl_adapter_proto.transcode.columns import DURATION, Column, ColumnKind, columns_of, pack_layout
+from rosidl_adapter_proto.transcode.columns import (
+    DURATION,
+    SERIALIZATIONS,
+    Column,
+    ColumnKind,
+    columns_of,
+    pack_layout,
+)
 from rosidl_adapter_proto.transcode.plan import build_plan
 
 try:
@@ -62,7 +69,7 @@ class ColumnReader:
     Args:
         schema: The type of the messages.
         fields: Read only these, such as `header.stamp` or, of each point in a sequence, `points.x`.
-        serialization_format: How the messages are serialized: `cdr` or `protobuf`.
+        serialization_format: How the messages are serialized: `cdr`, `protobuf` or `ros1`.
         maximum_rows: A record batch has so many rows at most.
         maximum_bytes: A record batch ends with the row with which it has so many bytes, or before the row with which
             a column would have more than 2 GiB.
@@ -81,18 +88,19 @@ class ColumnReader:
         maximum_rows: int = MAXIMUM_ROWS,
         maximum_bytes: int = MAXIMUM_BYTES,
     ) -> None:
-        if serialization_format not in ("cdr", "protobuf"):
+        if serialization_format not in SERIALIZATIONS:
             raise RequestError(
-                f"tables are made of cdr and protobuf messages, not {serialization_format!r}; convert them first"
+                f"tables are made of {', '.join(SERIALIZATIONS)} messages, not of {serialization_format!r} ones; "
+                "convert them first"
             )
         plan = build_plan(schema.type_description, schema.descriptor, fields=fields)
         self._columns = columns_of(plan)
         self._fields = [_field(each) for each in self._columns]
-        self._is_protobuf = serialization_format == "protobuf"
         self._maximum_rows = maximum_rows
         self._maximum_bytes = maximum_bytes
         transcoder = _core.Transcoder(plan.pack(), plan.type_name, MAXIMUM_SIZE)
-        self._filler = _core.ColumnFiller(transcoder, pack_layout(self._columns))
+        layout, serialization = pack_layout(self._columns), SERIALIZATIONS.index(serialization_format)
+        self._filler = _core.ColumnFiller(transcoder, layout, serialization)
         self.arrow_schema = pa.schema([each for each in self._fields if each is not None])
 
     def __len__(self) -> int:
@@ -116,9 +124,7 @@ class ColumnReader:
         Raises:
             TranscodeError: A message is not valid. Those before it were appended, and `batch_index` tells which it is.
         """
-        return self._filler.append(
-            messages, ranges, start, self._is_protobuf, self._maximum_rows, self._maximum_bytes
-        )
+        return self._filler.append(messages, ranges, start, self._maximum_rows, self._maximum_bytes)
 
     def record_batch(self) -> pa.RecordBatch:
         """Return what was appended since the last record batch."""

@@ -18,6 +18,9 @@ from rosidl_adapter_proto.transcode.plan import NOT_IN_PROTOBUF, MessagePlan, Op
 MAXIMUM_COLUMNS = 10_000
 """So many columns a table has at most, those inside of others included."""
 
+SERIALIZATIONS = ("cdr", "protobuf", "ros1")
+"""How messages are serialized that columns are filled with; as in `columns.hpp`."""
+
 TIME = "builtin_interfaces/msg/Time"
 DURATION = "builtin_interfaces/msg/Duration"
 

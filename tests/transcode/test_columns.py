@@ -291,7 +291,9 @@ def test_half_of_a_surrogate_pair() -> None:
 def test_other_formats() -> None:
     with pytest.raises(RequestError) as caught:
         ColumnReader(schema_of(STRING, "test/msg/String"), serialization_format="json")
-    assert str(caught.value) == "tables are made of cdr and protobuf messages, not 'json'; convert them first"
+    assert str(caught.value) == (
+        "tables are made of cdr, protobuf, ros1 messages, not of 'json' ones; convert them first"
+    )
 
 
 def test_too_many_columns() -> None:

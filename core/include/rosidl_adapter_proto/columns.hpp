@@ -27,7 +27,9 @@ enum class ColumnKind : uint8_t {
   Time = 6,     // a message of the fields `int32 sec`, `uint32 nanosec`, as one int64: nanoseconds
 };
 
-enum class Serialization : uint8_t { Cdr, Protobuf };
+// The numbers of `SERIALIZATIONS` in rosidl_adapter_proto/transcode/columns.py.
+enum class Serialization : uint8_t { Cdr, Protobuf, Ros1 };
+constexpr uint8_t kSerializations = 3;
 
 // No buffer has more bytes than offsets of 32 bits can tell, and all buffers of a batch together not more
 // than twice that.
