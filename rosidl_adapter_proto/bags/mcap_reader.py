@@ -66,8 +66,17 @@ class McapReader:
                 attachment.data,
             )
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
         """Yield the chunks that may have messages of a selection; see `StorageReader.chunks`."""
+        places = self._chunks(selection)
+        if in_time_order:
+            places = iter(sorted(map(_without_data, places), key=lambda place: place.start_time))
+        for place in places:
+            yield place if isinstance(place, StoredChunk) else self._file.stored_chunk(place)
+
+    def _chunks(self, selection: Selection) -> Iterator[ChunkPlace | StoredChunk]:
         for found in walk(self._file, self._file.size, self._damaged):
             if isinstance(found, Place) and found.opcode == Opcode.MESSAGE_INDEX:
                 continue
@@ -77,7 +86,7 @@ class McapReader:
                 if _in_time(found, selection):
                     yield found
             elif _in_time(found, selection) and self._has_topics(found, selection):
-                yield self._file.stored_chunk(found)
+                yield found
 
     def __enter__(self) -> McapReader:
         return self
@@ -126,3 +135,11 @@ def _in_time(chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
     return chunk.end_time >= selection.start_time and (
         selection.end_time is None or chunk.start_time < selection.end_time
     )
+
+
+def _without_data(chunk: ChunkPlace | StoredChunk) -> ChunkPlace:
+    """Return where a chunk is, so that its data can be read later."""
+    if isinstance(chunk, ChunkPlace):
+        return chunk
+    start, size = chunk.position, chunk.size
+    return ChunkPlace(chunk.where, start, start, size, "", size, chunk.crc, chunk.start_time, chunk.end_time)

@@ -183,6 +183,7 @@ class McapFile:
             chunk.start_time,
             chunk.end_time,
             message_count,
+            chunk.start,
         )
 
     def loose_messages(self, first: Place, limit: int) -> tuple[StoredChunk, int]:
@@ -208,7 +209,8 @@ class McapFile:
             raise self.damaged(first, "it is too short for a message")
         data = memoryview(piece)[:position]
         where = self.where(first.start)
-        return StoredChunk(where, data, "", position, 0, start_time, end_time, count), first.start + position
+        chunk = StoredChunk(where, data, "", position, 0, start_time, end_time, count, first.start)
+        return chunk, first.start + position
 
 
 def opcode_name(opcode: int) -> str:
