@@ -33,6 +33,8 @@ except ImportError as error:
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
+__all__ = ["MAXIMUM_BYTES", "MAXIMUM_ROWS", "ColumnReader", "pa"]
+
 MAXIMUM_ROWS = 2**17
 """So many rows a record batch has, unless somebody asks for others."""
 
