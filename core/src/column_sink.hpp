@@ -95,7 +95,7 @@ class ColumnSink : public Stop {
   At string(const Operation& op, At at, int64_t, Text text) {
     uint8_t* const out = room(at->values, text.size);
     if (out == nullptr) return nullptr;
-    copy(out, text.data, text.size);
+    copy_text(out, text);
     return end_string(op, at);
   }
 
@@ -136,13 +136,30 @@ class ColumnSink : public Stop {
 
   // Returns the place for `size` bytes behind what there is.
   ROSIDL_PROTO_INLINE uint8_t* room(Memory& memory, uint64_t size) {
-    if (memory.size() + size > memory.capacity() || memory.data() == nullptr) {
+    if (size > memory.capacity() - memory.size()) {
       const Reason why = grow(memory, size, capacity_);
       if (why != Reason::None) return stop(why), nullptr;
     }
     uint8_t* const place = end_of(memory);
     memory.add(size);
     return place;
+  }
+
+  // As `copy`, without a call for the few bytes that most texts have.
+  static void copy_text(uint8_t* to, Text text) {
+    if (text.size > 16) {
+      std::memcpy(to, text.data, static_cast<size_t>(text.size));
+    } else if (text.size >= 8) {
+      const auto last = load_little<uint64_t>(text.data + text.size - 8);
+      store_little(to, load_little<uint64_t>(text.data));
+      store_little(to + text.size - 8, last);
+    } else if (text.size >= 4) {
+      const auto last = load_little<uint32_t>(text.data + text.size - 4);
+      store_little(to, load_little<uint32_t>(text.data));
+      store_little(to + text.size - 4, last);
+    } else {
+      for (uint64_t i = 0; i < text.size; ++i) to[i] = text.data[i];
+    }
   }
 
   template <class T>

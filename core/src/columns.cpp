@@ -65,6 +65,7 @@ const char* Columns::load(const Plan& plan, const uint8_t* layout, size_t size) 
     const uint8_t* const end = layout + size;
     if (const char* wrong = add(plan.root(), &layout, end)) return wrong;
     if (layout != end) return kWrong;
+    find_variable(0, columns_.size(), 1);
     push(ColumnKind::Struct, 0, 1);
     return prepare(nullptr) ? nullptr : kNoMemory;
   } catch (const std::exception&) {
@@ -131,13 +132,31 @@ const char* Columns::add_element(const Operation& op, const uint8_t** layout, co
   });
 }
 
+// Finds out which columns grow with the number of rows alone; `values` of a row are in each of these.
+void Columns::find_variable(size_t first, size_t last, uint64_t values) {
+  for (size_t i = first; i != last; i += columns_[i].span) {
+    const Column& column = columns_[i];
+    const size_t end = i + column.span;
+    if (column.fixed()) {
+      row_bytes_ += values * column.length * column.width;
+      find_variable(i + 1, end, values * column.length);
+    } else {
+      for (size_t each = i; each != end; ++each) variable_.push_back(static_cast<uint32_t>(each));
+    }
+  }
+}
+
 // Takes memory for the first rows: as much as a batch before this one took, if there is so much.
 bool Columns::prepare(const std::vector<Column>* before) {
   rows_ = capacity_ = 0;
   for (size_t i = 0; i < columns_.size(); ++i) {
     Column& column = columns_[i];
     const Column* const model = before == nullptr ? nullptr : &(*before)[i];
-    if (model != nullptr && model->values.size() != 0) grow(column.values, model->values.size(), &capacity_);
+    const uint64_t expected = model == nullptr ? 0 : model->values.size();
+    // A place to begin with; what could be more comes when it is needed.
+    if (grow(column.values, expected, &capacity_) != Reason::None &&
+        grow(column.values, 0, &capacity_) != Reason::None)
+      return false;
     if (column.fixed()) continue;
     const uint64_t size = model == nullptr ? sizeof(uint32_t) : model->offsets.size();
     if (grow(column.offsets, size, &capacity_) != Reason::None) return false;
@@ -194,12 +213,6 @@ Column* Columns::cut(Column* column, uint64_t count) {
   column->values.cut(inner * column->width);
   for (Column* each = column + 1; each != last;) each = cut(each, inner);
   return column + column->span;
-}
-
-uint64_t Columns::bytes() const {
-  uint64_t sum = 0;
-  for (const Column& each : columns_) sum += each.offsets.size() + each.values.size();
-  return sum;
 }
 
 bool Columns::take(std::vector<Column>* taken) noexcept {

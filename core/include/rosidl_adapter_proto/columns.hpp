@@ -72,7 +72,13 @@ class Columns {
   bool append(Serialization serialization, Input message, Error& error) noexcept;
 
   uint64_t rows() const { return rows_; }
-  uint64_t bytes() const;
+  // What all of them take.
+  uint64_t bytes() const {
+    uint64_t sum = rows_ * row_bytes_;
+    for (const uint32_t index : variable_)
+      sum += columns_[index].offsets.size() + columns_[index].values.size();
+    return sum;
+  }
 
   // Hands all rows over and begins anew; false if there is no memory for that, and then nothing is lost.
   bool take(std::vector<Column>* taken) noexcept;
@@ -84,11 +90,14 @@ class Columns {
   Column& push(ColumnKind kind, uint32_t width, uint32_t length);
   bool run(Serialization serialization, Input message, Error& error);
   bool prepare(const std::vector<Column>* before);
+  void find_variable(size_t first, size_t last, uint64_t values);
   static Column* cut(Column* column, uint64_t count);
 
   const Plan* plan_ = nullptr;
   std::unique_ptr<Fields> fields_;
-  std::vector<Column> columns_;  // and one more behind the last
+  std::vector<Column> columns_;     // and one more behind the last
+  std::vector<uint32_t> variable_;  // the columns whose size does not follow from the number of rows
+  uint64_t row_bytes_ = 0;          // of all other columns
   uint64_t rows_ = 0;
   uint64_t capacity_ = 0;  // of all columns
 };
