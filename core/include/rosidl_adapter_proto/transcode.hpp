@@ -35,6 +35,7 @@ class Lengths {
   }
 
   uint64_t size() const { return size_; }
+  void clear() { size_ = 0; }
   uint32_t& operator[](uint64_t index) { return data_[index]; }
   uint32_t operator[](uint64_t index) const { return data_[index]; }
 
