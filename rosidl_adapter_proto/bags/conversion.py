@@ -91,7 +91,9 @@ class Counts:
         return self.converted + self.copied + self.skipped + self.not_selected + self.lost
 
     def __add__(self, other: Counts) -> Counts:
-        return Counts(*(mine + its for mine, its in zip(vars(self).values(), vars(other).values(), strict=True)))
+        return Counts(
+            *(mine + its for mine, its in zip(vars(self).values(), vars(other).values(), strict=True))
+        )
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,9 @@ class FailedMessage:
     reason: str
 
     def __str__(self) -> str:
-        return f"{self.file}: message {self.number} of {self.topic}, recorded at {self.log_time}: {self.reason}"
+        return (
+            f"{self.file}: message {self.number} of {self.topic}, recorded at {self.log_time}: {self.reason}"
+        )
 
 
 @dataclass(frozen=True)
@@ -156,11 +160,9 @@ class Progress:
     """How far a conversion is.
 
     Attributes:
-        done: How many bytes of the source were converted.
-        total: How many there are.
+        done: How many bytes of the chunks were converted, as they lie in the files.
         message_count: How many messages were written.
     """
 
     done: int
-    total: int
     message_count: int

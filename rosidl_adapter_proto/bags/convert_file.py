@@ -8,31 +8,24 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from rosidl_adapter_proto.bags.chunks import ChunkConverter, ConvertedChunk, convert_chunk
-from rosidl_adapter_proto.bags.conversion import (
-    SHOWN_FAILURES,
-    ConversionResult,
-    Counts,
-    FailedMessage,
-    OnError,
-    Progress,
-    Settings,
-)
+from rosidl_adapter_proto.bags.chunks import ConvertedChunk, chunk_converter, convert_chunk
+from rosidl_adapter_proto.bags.compression import ZSTD
+from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Progress, Settings
 from rosidl_adapter_proto.bags.labels import label_warnings
-from rosidl_adapter_proto.bags.metadata import BagMetadata, write_inner_metadata
-from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.ledger import Ledger
+from rosidl_adapter_proto.bags.mcap_topics import ROS_DEFINITIONS, ROSBAG2
+from rosidl_adapter_proto.bags.mcap_writer import McapWriter
+from rosidl_adapter_proto.bags.model import CDR, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.pipeline import map_in_order
+from rosidl_adapter_proto.bags.recorded_file import MCAP
 from rosidl_adapter_proto.bags.recording import Recording
-from rosidl_adapter_proto.bags.routes import Fate, TopicRoute, plan_routes, selected_topics
+from rosidl_adapter_proto.bags.routes import Fate, plan_routes, selected_topics
 from rosidl_adapter_proto.bags.storage import StorageReader, StorageWriter
 from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.errors import BagError
 
 WINDOW_SIZE = 2**28
 """How many bytes of chunks are under way at once, not compressed, however many threads there are."""
-
-DESCRIPTION = "rosbag2"
-"""The name under which rosbag2 describes a bag inside its files."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +82,8 @@ def convert_file(task: FileTask, progress: Callable[[Progress], None] | None = N
         compression = _compression(task, reader)
         # The profile makes CDR mandatory, and what cannot be converted may be copied.
         profile = "ros2" if task.target_format == CDR and task.settings.on_error is not OnError.COPY else ""
-        with create_writer(
-            task.destination, task.storage, profile=profile, compression=compression
+        with McapWriter(
+            task.destination.open("wb"), str(task.destination), profile=profile, compression=compression
         ) as writer:
             return _FileConversion(task, reader, writer).run(progress)
 
@@ -175,7 +168,9 @@ class _FileConversion:
         task, settings = self._task, self._task.settings
         convert = partial(
             convert_chunk,
-            converter=chunk_converter(self._routes, self._failed_ids, task),
+            converter=chunk_converter(
+                self._routes, self._failed_ids, task.source_format, task.target_format, settings.plugins
+            ),
             writer=self._writer,
             start_time=settings.start_time,
             end_time=settings.end_time,

@@ -47,9 +47,9 @@ def label_warnings(reader: StorageReader, topics: Mapping[int, Topic]) -> list[s
         BagError: The file is damaged.
     """
     warnings = []
-    waiting = {
-        topic_id for topic_id, topic in topics.items() if topic.serialization_format in _CHECKS
-    } & {topic_id for topic_id, count in reader.statistics.message_counts.items() if count}
+    waiting = {topic_id for topic_id, topic in topics.items() if topic.serialization_format in _CHECKS} & {
+        topic_id for topic_id, count in reader.statistics.message_counts.items() if count
+    }
     while waiting:
         # The chunk that has one of them most likely has others too.
         found = _first_messages(reader, waiting) or {each: [] for each in waiting}

@@ -129,4 +129,6 @@ class Ledger:
             counts.lost = missing
             self.warnings.append(f"{self._path}: {missing} of the {said} messages of {name} are lost")
         elif missing:
-            self.warnings.append(f"{self._path}: it says that {name} has {said} messages, but {found} were found")
+            self.warnings.append(
+                f"{self._path}: it says that {name} has {said} messages, but {found} were found"
+            )

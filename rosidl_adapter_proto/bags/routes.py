@@ -8,9 +8,10 @@ from enum import Enum
 from fnmatch import fnmatchcase
 
 from rosidl_adapter_proto.bags.conversion import DEFAULT_FORMATS, OnError, Settings
-from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Statistics, Topic
+from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, RecordedDefinition, Statistics, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition
-from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.converters.ros1 import check_ros2_type
+from rosidl_adapter_proto.errors import BagError, ConverterError
 from rosidl_adapter_proto.schema.registry import Schema
 
 MIXED_FORMATS = (
@@ -45,6 +46,7 @@ class TopicRoute:
         fate: What becomes of its messages.
         result: The topic in the result; None if it is not there.
         schema: The type of the messages, if they are converted.
+        result_schema: The type of what they become.
         reason: Why they are not converted, though they should be.
     """
 
@@ -52,6 +54,7 @@ class TopicRoute:
     fate: Fate
     result: Topic | None = None
     schema: Schema | None = None
+    result_schema: Schema | None = None
     reason: str = ""
 
 
@@ -129,41 +132,59 @@ def _route(
         return TopicRoute(topic, Fate.COPIED, topic)
     try:
         schema = types.schema(topic)
-        result = _result(topic, target_format, schema, types)
-    except BagError as error:
+        if topic.serialization_format == ROS1 and target_format != PROTOBUF:
+            result_schema, ros_definition = _ros2_type(topic, schema, types)
+        else:
+            result_schema, ros_definition = schema, types.ros_definition(topic)
+    except (BagError, ConverterError) as error:
         if not has_messages:
             return TopicRoute(topic, Fate.COPIED, _without_definition(topic, target_format))
         if on_error is OnError.STOP:
             raise
-        copied = on_error is OnError.COPY
-        return TopicRoute(
-            topic, Fate.COPIED if copied else Fate.SKIPPED, topic if copied else None, reason=str(error)
-        )
-    return TopicRoute(topic, Fate.CONVERTED, result, schema)
+        if on_error is OnError.COPY:
+            return TopicRoute(topic, Fate.COPIED, topic, reason=str(error))
+        return TopicRoute(topic, Fate.SKIPPED, reason=str(error))
+    result = _result(topic, target_format, result_schema, ros_definition)
+    return TopicRoute(topic, Fate.CONVERTED, result, schema, result_schema)
 
 
-def _result(topic: Topic, target_format: str, schema: Schema, types: BagTypes) -> Topic:
+def _ros2_type(topic: Topic, schema: Schema, types: BagTypes) -> tuple[Schema, RecordedDefinition]:
+    """Return the type of ROS 2 that messages of ROS 1 get, and its definition.
+
+    Raises:
+        BagError: ROS 2 has no such type.
+        ConverterError: It has not all that the type of ROS 1 has.
+    """
+    ros2 = replace(topic, serialization_format=CDR, definition=RecordedDefinition(), type_hash="")
+    result = types.schema(ros2)
+    check_ros2_type(schema, result)
+    return result, types.ros_definition(ros2)
+
+
+def _result(topic: Topic, target_format: str, schema: Schema, ros_definition: RecordedDefinition) -> Topic:
     """Return what a topic becomes."""
-    ros_definition = types.ros_definition(topic)
-    to_ros = replace(
+    if target_format == PROTOBUF:
+        return replace(
+            topic,
+            serialization_format=target_format,
+            definition=protobuf_definition(schema),
+            ros_definition=ros_definition,
+            schema_name=schema.descriptor.full_name,
+        )
+    return replace(
         topic,
         serialization_format=target_format,
         definition=ros_definition,
         ros_definition=RecordedDefinition(),
         schema_name=topic.type_name,
     )
-    if target_format != PROTOBUF:
-        return to_ros
-    return replace(
-        to_ros,
-        definition=protobuf_definition(schema),
-        ros_definition=ros_definition,
-        schema_name=schema.descriptor.full_name,
-    )
 
 
 def _without_definition(topic: Topic, target_format: str) -> Topic:
     """Return a topic whose type nobody knows in another format: it has no messages, and so needs none."""
     return replace(
-        topic, serialization_format=target_format, definition=RecordedDefinition(), schema_name=topic.type_name
+        topic,
+        serialization_format=target_format,
+        definition=RecordedDefinition(),
+        schema_name=topic.type_name,
     )
