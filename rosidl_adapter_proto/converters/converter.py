@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import repeat
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
+from rosidl_adapter_proto.converters.cdr import CdrConverter
 from rosidl_adapter_proto.converters.interfaces import SerializedBagMessage
+from rosidl_adapter_proto.converters.protobuf import ProtobufConverter
 from rosidl_adapter_proto.converters.registry import SUFFIX, ConverterRegistry
+from rosidl_adapter_proto.converters.ros1 import Ros1Deserializer
 from rosidl_adapter_proto.errors import ConversionError, ConverterError, Error
+from rosidl_adapter_proto.transcode.records import Direction
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.converters.interfaces import Result
     from rosidl_adapter_proto.schema.registry import Schema
+
+_TO_PROTOBUF: Mapping[type[Any], tuple[Direction, ...]] = {
+    CdrConverter: (Direction.CDR_TO_PROTO,),
+    ProtobufConverter: (),
+    Ros1Deserializer: (Direction.ROS1_TO_PROTO,),
+}
+_FROM_PROTOBUF: Mapping[type[Any], tuple[Direction, ...]] = {
+    CdrConverter: (Direction.PROTO_TO_CDR,),
+    ProtobufConverter: (),
+}
 
 Converted: TypeAlias = SerializedBagMessage | Error
 """What becomes of one message of a batch: the new one, or why there is none."""
@@ -55,6 +69,18 @@ class Converter:
             raise ConverterError(_not_found(registry, output_format, is_input=False))
         self._deserializer = deserializer
         self._serializer = serializer
+
+    @property
+    def native_directions(self) -> tuple[Direction, ...] | None:
+        """The steps in which a `RecordConverter` does the same to whole chunks; None if plugins are needed for it.
+
+        There is one step, two for ROS 1 to CDR (of which the second has the type in ROS 2), and none for equal formats.
+        """
+        if self._is_copy:
+            return ()
+        before = _TO_PROTOBUF.get(type(self._deserializer))
+        after = _FROM_PROTOBUF.get(type(self._serializer))
+        return None if before is None or after is None else before + after
 
     def convert(
         self,

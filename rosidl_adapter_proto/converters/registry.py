@@ -18,6 +18,7 @@ from rosidl_adapter_proto.converters.interfaces import (
     SerializationFormatSerializer,
 )
 from rosidl_adapter_proto.converters.protobuf import ProtobufConverter
+from rosidl_adapter_proto.converters.ros1 import Ros1Deserializer
 from rosidl_adapter_proto.errors import ConverterError
 
 GROUP = "rosidl_adapter_proto.converters"
@@ -25,8 +26,13 @@ GROUP = "rosidl_adapter_proto.converters"
 
 SUFFIX = "_converter"
 
-BUILT_IN: Mapping[str, type[Any]] = {"cdr": CdrConverter, "protobuf": ProtobufConverter}
-"""What is there without any plugin, by format."""
+BUILT_IN: Mapping[str, type[Any]] = {
+    "cdr": CdrConverter,
+    "protobuf": ProtobufConverter,
+    "ros1": Ros1Deserializer,
+    "rosbag_v2": Ros1Deserializer,
+}
+"""What is there without any plugin, by format. MCAP says `ros1`, and rosbag2_bag_v2 `rosbag_v2`."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from rosidl_adapter_proto.converters import (
 )
 from rosidl_adapter_proto.errors import ConversionError, ConverterError
 from rosidl_adapter_proto.schema.registry import Schema
+from rosidl_adapter_proto.transcode.records import Direction
 from tests.converters.plugins import Failing, JsonConverter, JsonDeserializer, JsonSerializer
 
 HEADER = b"\0\1\0\0"
@@ -67,11 +68,30 @@ def test_equal_formats_are_not_looked_up(schema: Schema) -> None:
         assert converter.convert_batch([MESSAGE], schema) == [MESSAGE]
 
 
+@pytest.mark.parametrize(
+    ("formats", "directions"),
+    [
+        (("cdr", "protobuf"), (Direction.CDR_TO_PROTO,)),
+        (("protobuf", "cdr"), (Direction.PROTO_TO_CDR,)),
+        (("ros1", "protobuf"), (Direction.ROS1_TO_PROTO,)),
+        (("rosbag_v2", "protobuf"), (Direction.ROS1_TO_PROTO,)),
+        (("ros1", "cdr"), (Direction.ROS1_TO_PROTO, Direction.PROTO_TO_CDR)),
+        (("cdr", "cdr"), ()),
+        (("json", "cdr"), None),
+        (("protobuf", "json"), None),
+    ],
+)
+def test_what_is_native(
+    formats: tuple[str, str], directions: tuple[Direction, ...] | None, registry: ConverterRegistry
+) -> None:
+    assert Converter(*formats, registry).native_directions == directions
+
+
 def test_the_input_is_looked_for_first() -> None:
     registry = ConverterRegistry()
     registry.register("read_converter", JsonDeserializer)
     registry.register("written_converter", JsonSerializer)
-    read = "formats that can be read: cdr, protobuf, read"
+    read = "formats that can be read: cdr, protobuf, read, ros1, rosbag_v2"
     written = "formats that can be written: cdr, protobuf, written"
     here = "tests.converters.plugins"
     for formats, text in {
@@ -79,6 +99,8 @@ def test_the_input_is_looked_for_first() -> None:
         ("cdr", "y"): f"Could not find converter for format y: no plugin is called y_converter; {written}",
         ("cdr", "read"): "Could not find converter for format read: "
         f"read_converter ({here}:JsonDeserializer, registered) only reads it; {written}",
+        ("cdr", "ros1"): "Could not find converter for format ros1: ros1_converter "
+        f"(rosidl_adapter_proto.converters.ros1:Ros1Deserializer, built in) only reads it; {written}",
         ("written", "cdr"): "Could not find converter for format written: "
         f"written_converter ({here}:JsonSerializer, registered) only writes it; {read}",
     }.items():
