@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from rosidl_adapter_proto.bags.compression import records_of
-from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, StoredChunk
+from rosidl_adapter_proto.bags.model import StoredChunk
 from rosidl_adapter_proto.bags.plugins import PluginConverter
 from rosidl_adapter_proto.bags.routes import TopicRoute
 from rosidl_adapter_proto.bags.storage import PackedChunk, StorageWriter
-from rosidl_adapter_proto.converters import Converter, ConverterRegistry
+from rosidl_adapter_proto.converters import Converter
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.transcode import Transcoder
 from rosidl_adapter_proto.transcode.error import RecordsError
 from rosidl_adapter_proto.transcode.records import (
     Converted,
-    Direction,
     Failure,
     RecordConverter,
     Route,
@@ -35,39 +34,21 @@ class ChunkConverter(Protocol):
     def convert(self, data: Buffer, *, start_time: int = 0, end_time: int | None = None) -> Converted: ...
 
 
-_NATIVE = {
-    (CDR, PROTOBUF): Direction.CDR_TO_PROTO,
-    (PROTOBUF, CDR): Direction.PROTO_TO_CDR,
-    (ROS1, PROTOBUF): Direction.ROS1_TO_PROTO,
-}
-"""What the native module converts."""
-
-
 def chunk_converter(
     routes: Mapping[int, TopicRoute],
     failed_ids: Mapping[int, int],
-    source_format: str,
-    target_format: str,
-    plugins: Sequence[str],
+    converter: Converter,
 ) -> ChunkConverter:
     """Return what converts the chunks of a file.
 
     Args:
         routes: What becomes of each topic, by its id.
         failed_ids: The ids in the result of messages that cannot be converted; without one they are left out.
-        source_format: How the messages are serialized.
-        target_format: What they are converted to.
-        plugins: Converter plugins in the form `module:Class`, besides those that are installed.
-
-    Raises:
-        ConverterError: There is no converter for a format, or a plugin is wrong.
+        converter: What converts messages from their serialization format to the other.
     """
-    direction = _NATIVE.get((source_format, target_format))
-    if direction is None:
-        registry = ConverterRegistry()
-        for each in plugins:
-            registry.load(each)
-        return PluginConverter(routes, failed_ids, Converter(source_format, target_format, registry))
+    directions = converter.native_directions
+    if directions is None or len(directions) > 1:
+        return PluginConverter(routes, failed_ids, converter)
     transcoders: dict[Schema, Transcoder] = {}
     native: dict[int, Route | None] = {}
     for topic_id, route in routes.items():
@@ -78,7 +59,9 @@ def chunk_converter(
         else:
             if route.schema not in transcoders:
                 transcoders[route.schema] = Transcoder(route.schema.type_description, route.schema.descriptor)
-            native[topic_id] = Route(topic_id, transcoders[route.schema], direction, failed_ids.get(topic_id))
+            native[topic_id] = Route(
+                topic_id, transcoders[route.schema], directions[0], failed_ids.get(topic_id)
+            )
     return RecordConverter(native)
 
 

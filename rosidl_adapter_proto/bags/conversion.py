@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF
+from rosidl_adapter_proto.converters import ConverterRegistry
 
 DEFAULT_FORMATS = {PROTOBUF: CDR}
 """What a serialization format is converted to if nobody says; that of others is protobuf."""
@@ -48,7 +49,7 @@ class Settings:
         on_error: What becomes of messages that cannot be converted.
         include: Folders with definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else.
-        plugins: Converter plugins in the form `module:Class`, besides those that are installed.
+        registry: Where converter plugins come from; None for those that are installed.
         threads: On how many threads to convert; None for one on each processor.
     """
 
@@ -63,7 +64,7 @@ class Settings:
     on_error: OnError = OnError.STOP
     include: tuple[Path, ...] = ()
     distro: str | None = None
-    plugins: tuple[str, ...] = ()
+    registry: ConverterRegistry | None = None
     threads: int | None = None
 
 
@@ -160,9 +161,11 @@ class Progress:
     """How far a conversion is.
 
     Attributes:
-        done: How many bytes of the chunks were converted, as they lie in the files.
+        done: How many bytes of the source are done.
+        total: How many there are.
         message_count: How many messages were written.
     """
 
     done: int
+    total: int
     message_count: int

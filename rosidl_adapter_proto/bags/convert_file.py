@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from rosidl_adapter_proto.bags.chunks import ConvertedChunk, chunk_converter, convert_chunk
 from rosidl_adapter_proto.bags.compression import ZSTD
-from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Progress, Settings
+from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Settings
+from rosidl_adapter_proto.bags.description import WrittenFile, describe
 from rosidl_adapter_proto.bags.labels import label_warnings
 from rosidl_adapter_proto.bags.ledger import Ledger
 from rosidl_adapter_proto.bags.mcap_topics import ROS_DEFINITIONS, ROSBAG2
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
+from rosidl_adapter_proto.bags.metadata import write_inner_metadata
 from rosidl_adapter_proto.bags.model import CDR, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recorded_file import MCAP
@@ -22,6 +24,7 @@ from rosidl_adapter_proto.bags.recording import Recording
 from rosidl_adapter_proto.bags.routes import Fate, plan_routes, selected_topics
 from rosidl_adapter_proto.bags.storage import StorageReader, StorageWriter
 from rosidl_adapter_proto.bags.types import BagTypes
+from rosidl_adapter_proto.converters import Converter
 from rosidl_adapter_proto.errors import BagError
 
 WINDOW_SIZE = 2**28
@@ -62,16 +65,16 @@ class FileResult:
     """
 
     result: ConversionResult
-    topics: Mapping[int, Topic] = field(default_factory=dict)
-    statistics: Statistics = Statistics()
+    topics: Mapping[int, Topic]
+    statistics: Statistics
 
 
-def convert_file(task: FileTask, progress: Callable[[Progress], None] | None = None) -> FileResult:
+def convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileResult:
     """Convert one file.
 
     Args:
         task: What to do.
-        progress: Called when something was written.
+        progress: Called whenever something was written, with the numbers of bytes of the source and of messages.
 
     Raises:
         BagError: A message or the file cannot be converted, and it was not asked to go on; the file to write cannot be
@@ -123,7 +126,7 @@ class _FileConversion:
         self._ledger = Ledger(reader.path, self._routes, reader.statistics.message_counts, settings)
         self._topics: dict[int, Topic] = {}
 
-    def run(self, progress: Callable[[Progress], None] | None) -> FileResult:
+    def run(self, progress: Callable[[int, int], None]) -> FileResult:
         """Convert everything."""
         warnings = label_warnings(self._reader, self._selected())
         for topic_id, route in self._routes.items():
@@ -163,19 +166,20 @@ class _FileConversion:
     def _add_topic(self, topic: Topic, topic_id: int) -> None:
         self._topics[self._writer.add_topic(topic, topic_id)] = topic
 
-    def _convert_chunks(self, progress: Callable[[Progress], None] | None) -> None:
+    def _convert_chunks(self, progress: Callable[[int, int], None]) -> None:
         """Convert all chunks on threads, and write them in their order."""
         task, settings = self._task, self._task.settings
         convert = partial(
             convert_chunk,
             converter=chunk_converter(
-                self._routes, self._failed_ids, task.source_format, task.target_format, settings.plugins
+                self._routes,
+                self._failed_ids,
+                Converter(task.source_format, task.target_format, settings.registry),
             ),
             writer=self._writer,
             start_time=settings.start_time,
             end_time=settings.end_time,
         )
-        done = 0
         for chunk in map_in_order(
             convert,
             self._chunks(),
@@ -184,9 +188,7 @@ class _FileConversion:
             size_limit=WINDOW_SIZE,
         ):
             self._write(chunk)
-            done += memoryview(chunk.source.data).nbytes
-            if progress:
-                progress(Progress(done, self._writer.statistics.message_count))
+            progress(memoryview(chunk.source.data).nbytes, chunk.packed.message_count if chunk.packed else 0)
         if self._damage:
             self._ledger.add_damage(self._damage, self._writer.statistics.message_counts)
 
@@ -219,3 +221,6 @@ class _FileConversion:
         for name, values in self._reader.metadata:
             if name not in (ROSBAG2, ROS_DEFINITIONS):
                 self._writer.add_metadata(name, values)
+        file = WrittenFile(self._task.destination.name, self._topics, self._writer.statistics)
+        metadata = describe(self._task.storage, [file], self._task.recording.metadata)
+        self._writer.add_metadata(ROSBAG2, {"serialized_metadata": write_inner_metadata(metadata)})

@@ -81,16 +81,18 @@ class PluginConverter:
         topic_ids, indexes = array("H"), []
         for index, result in results.items():
             topic_id = records.topic_ids[index]
-            if isinstance(result, Error):
-                failures.append(
-                    Failure(topic_id, records.log_times[index], records.sequences[index], index, result)
-                )
-                if topic_id not in self._failed_ids:
-                    continue
-                topic_id, result = self._failed_ids[topic_id], records[index]
-            topic_ids.append(topic_id)
-            indexes.append(index)
-            messages.append(result)
+            if not isinstance(result, Error):
+                topic_ids.append(topic_id)
+                indexes.append(index)
+                messages.append(result)
+                continue
+            failures.append(
+                Failure(topic_id, records.log_times[index], records.sequences[index], index, result)
+            )
+            if topic_id in self._failed_ids:
+                topic_ids.append(self._failed_ids[topic_id])
+                indexes.append(index)
+                messages.append(records[index])
         data = pack_records(
             topic_ids,
             array("I", (records.sequences[each] for each in indexes)),
