@@ -204,8 +204,10 @@ class _OpenedFile:
     def attachments(self) -> Iterator[Attachment]:
         return self._reader.attachments()
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        for chunk in self._reader.chunks(selection):
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        for chunk in self._reader.chunks(selection, in_time_order=in_time_order):
             if self._messages_compressed:
                 yield from _with_plain_messages(chunk, selection)
             else:

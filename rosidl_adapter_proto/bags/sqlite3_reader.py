@@ -96,13 +96,15 @@ class SqliteReader:
         """Yield nothing: a database has no room for them."""
         return iter(())
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        """Yield the messages of a selection, in the order of the table, as chunks of about `CHUNK_SIZE` bytes.
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        """Yield the messages of a selection as chunks of about `CHUNK_SIZE` bytes; see `StorageReader.chunks`.
 
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
-        query, values = self._selecting(selection)
+        query, values = self._selecting(selection, in_time_order)
         ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
         done = 0
         for rows in self._batches(query, values):
@@ -226,7 +228,7 @@ class SqliteReader:
         """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
         return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
 
-    def _selecting(self, selection: Selection) -> tuple[str, list[int]]:
+    def _selecting(self, selection: Selection, in_time_order: bool) -> tuple[str, list[int]]:
         """Return the query for the messages of a selection that come after a row and up to another, and its values."""
         conditions = ["id > ?", "id <= ?"]
         values: list[int] = []
@@ -242,10 +244,9 @@ class SqliteReader:
         if selection.end_time is not None:
             conditions.append("+timestamp < ?")
             values.append(min(selection.end_time, _LAST_ROW))
-        return (
-            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id",
-            values,
-        )
+        order = "timestamp, id" if in_time_order else "id"
+        where = " AND ".join(conditions)
+        return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
     def _batches(self, query: str, values: list[int]) -> Iterator[list[tuple[Any, ...]]]:
         rows: list[tuple[Any, ...]] = []
