@@ -40,7 +40,7 @@ class Ros1Deserializer(SerializationFormatDeserializer):
 
     def to_protobuf(self, serialized_message: SerializedBagMessage, type_support: Schema) -> Buffer:
         transcoder = self._transcoders[type_support]
-        return transcoder.ros1_to_proto(serialized_message.serialized_data)  # type: ignore
+        return transcoder.ros1_to_proto(serialized_message.serialized_data)
 
 
 class _Transcoders(dict["Schema", Transcoder]):
