@@ -43,7 +43,16 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Where Python finds the installed plugin, and this package."""
     folder = tmp_path_factory.mktemp("plugin")
     shutil.copytree(ROOT / "examples/converter_plugin", folder / "source")
-    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--no-index")
+    pip = (
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
+    )
     run(*pip, "--target", folder / "installed", folder / "source", folder=folder)
     return f"{folder / 'installed'}:{ROOT}"
 
