@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from rosidl_adapter_proto.cli.options import bag_source_options, time_options
 from rosidl_adapter_proto.errors import RequestError
 
 
@@ -13,31 +14,40 @@ from rosidl_adapter_proto.errors import RequestError
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.argument("topic")
 @click.option(
-    "--output",
-    "-o",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="The file to write.",
+    "--output", "-o", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The table."
 )
 @click.option(
     "--format",
     "file_format",
     type=click.Choice(["parquet", "arrow", "csv"]),
-    help="What to write, if the suffix of the file does not say.",
+    help="What to write, where the suffix of FILE does not say.",
 )
-@click.option(
-    "--fields", metavar="NAMES", help="Only these fields, such as header.stamp,linear_acceleration."
-)
-def command(bag: Path, topic: str, output: Path, file_format: str | None, fields: str | None) -> None:
-    """Write the messages of one TOPIC of BAG as a table: Parquet, Arrow (.arrow, .feather) or CSV.
+@click.option("--fields", metavar="A.B,C", help="Only these fields of the messages.")
+@time_options
+@bag_source_options
+def command(
+    bag: Path,
+    topic: str,
+    output: Path,
+    file_format: str | None,
+    fields: str | None,
+    start: int | None,
+    end: int | None,
+    include: tuple[Path, ...],
+    distro: str | None,
+) -> None:
+    """Write the messages of a TOPIC in BAG as a table, with a row for each and its fields as columns.
 
-    Nested messages and lists stay what they are; in CSV, fields of nested messages are columns, and lists are JSON.
+    The suffix of FILE says what is written: .parquet, .arrow or .feather, or .csv. Nested messages and lists stay what
+    they are; in CSV, each field of a nested message is a column, and a list is JSON.
     """
+    from rosidl_adapter_proto.bags.bag import open_bag
+
     try:
         from rosidl_adapter_proto.bags.table import write_table
     except ImportError as error:
         raise RequestError(str(error)) from None
-    chosen = None if fields is None else [each.strip() for each in fields.split(",")]
-    rows = write_table(bag, topic, output, file_format=file_format, fields=chosen)
+    names = None if fields is None else [name.strip() for name in fields.split(",")]
+    with open_bag(bag, include=include, distro=distro) as opened:
+        rows = write_table(opened, topic, output, file_format=file_format, fields=names, start=start, end=end)
     click.echo(f"{output}: {rows} rows")
