@@ -152,7 +152,7 @@ def write_one(path: Path, definition: str, *messages: bytes, times: list[int] | 
     from mcap.writer import Writer
 
     with path.open("wb") as file:
-        writer = Writer(file)
+        writer: Any = Writer(file)
         writer.start(profile="ros2", library="test")
         schema = writer.register_schema("test_msgs/msg/T", "ros2msg", definition.encode())
         channel = writer.register_channel("/t", "cdr", schema)
@@ -330,7 +330,7 @@ def write_two(path: Path, first: str, second: str) -> Path:
     from mcap.writer import Writer
 
     with path.open("wb") as file:
-        writer = Writer(file)
+        writer: Any = Writer(file)
         writer.start(profile="ros2", library="test")
         for time, definition in enumerate((first, second, first)):
             schema = writer.register_schema(f"test_msgs/msg/T{time % 2}", "ros2msg", definition.encode())
@@ -354,7 +354,7 @@ def test_other_serialization_formats(tmp_path: Path) -> None:
 
     path = tmp_path / "b.mcap"
     with path.open("wb") as file:
-        writer = Writer(file)
+        writer: Any = Writer(file)
         writer.start()
         schema = writer.register_schema("test_msgs/msg/T", "ros2msg", b"bool x\n")
         writer.add_message(writer.register_channel("/t", "cbor", schema), 0, b"", 0)
