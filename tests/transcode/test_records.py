@@ -5,6 +5,7 @@ from __future__ import annotations
 import array
 import functools
 import io
+import mmap
 import pickle
 import random
 import struct
@@ -209,6 +210,15 @@ def test_every_topic_id() -> None:
     )
     converted = RecordConverter({each: Route(65535 - each) for each in range(65536)}).convert(chunk)
     assert read_records(converted.data).topic_ids.tolist() == [65535 - each for each in ids]
+
+
+def test_a_chunk_that_is_too_large() -> None:
+    with mmap.mmap(-1, 2**32) as zeros:  # of which nothing is touched
+        with pytest.raises(RecordsError) as caught:
+            index_records(zeros)
+    assert str(caught.value) == (
+        f"byte 0 of the chunk: the chunk has {2**32} bytes and may have {LARGEST}; make smaller chunks"
+    )
 
 
 def test_an_empty_chunk() -> None:
