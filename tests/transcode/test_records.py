@@ -213,9 +213,9 @@ def test_every_topic_id() -> None:
 
 
 def test_a_chunk_that_is_too_large() -> None:
-    with mmap.mmap(-1, 2**32) as zeros:  # of which nothing is touched
-        with pytest.raises(RecordsError) as caught:
-            index_records(zeros)
+    # Of this memory nothing is touched.
+    with mmap.mmap(-1, 2**32) as zeros, pytest.raises(RecordsError) as caught:
+        index_records(zeros)
     assert str(caught.value) == (
         f"byte 0 of the chunk: the chunk has {2**32} bytes and may have {LARGEST}; make smaller chunks"
     )
