@@ -384,6 +384,20 @@ def test_threads() -> None:
         assert [bytes(each.data) for each in pool.map(converter.convert, chunks)] == expected
 
 
+def test_memory_is_used_again_when_nobody_looks_at_it() -> None:
+    converter = RecordConverter({1: Route(1)})
+    chunks = [simple_chunk((1, bytes([i]) * (100_000 >> i % 5))) for i in range(40)]
+    for _ in range(2):
+        results = [converter.convert(each).data for each in chunks]
+        assert results == chunks
+        kept = results[7][-9:]
+        del results
+        assert converter.convert(chunks[1]).data == chunks[1]
+        with pytest.raises(RecordsError):
+            converter.convert(chunks[2] + b"\5")
+        assert bytes(kept) == bytes([7]) * 9
+
+
 def test_results_outlive_their_converter() -> None:
     converted = RecordConverter({1: Route(1)}).convert(simple_chunk((1, b"abc")))
     part = converted.data[-3:]

@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "transcode.hpp"
@@ -154,11 +155,13 @@ class ByTopic {
 class Memory {
  public:
   Memory() = default;
-  Memory(Memory&& other) noexcept : data_(other.data_), size_(other.size_), capacity_(other.capacity_) {
-    other.data_ = nullptr;
-    other.size_ = other.capacity_ = 0;
+  Memory(Memory&& other) noexcept { *this = std::move(other); }
+  Memory& operator=(Memory&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+    return *this;
   }
-  Memory& operator=(Memory&&) = delete;
   ~Memory() { std::free(data_); }
 
   const uint8_t* data() const { return data_; }
@@ -169,6 +172,9 @@ class Memory {
     if (more > capacity_ - size_ && !grow(more)) return nullptr;
     return data_ + size_;
   }
+  // Forgets what there is, and keeps the room.
+  void clear() { size_ = 0; }
+
   // So many of the bytes that there is room for are written.
   void add(uint64_t written) { size_ += written; }
 
