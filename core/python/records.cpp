@@ -5,7 +5,7 @@
 #include <rosidl_adapter_proto/convert.hpp>
 #include <vector>
 
-#include "memory.hpp"
+#include "memory_pool.hpp"
 #include "transcoder.hpp"
 
 namespace rosidl_proto {

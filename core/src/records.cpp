@@ -89,17 +89,6 @@ std::string reason(const RecordsError& error) {
   return "";
 }
 
-bool Memory::grow(uint64_t more) {
-  const uint64_t capacity = std::max(size_ + more, capacity_ + capacity_ / 2);
-  if (capacity > SIZE_MAX) return false;
-  if (size_ == 0) std::free(std::exchange(data_, nullptr)), capacity_ = 0;  // there is nothing to move
-  void* const memory = std::realloc(data_, static_cast<size_t>(capacity));
-  if (memory == nullptr) return false;
-  data_ = static_cast<uint8_t*>(memory);
-  capacity_ = capacity;
-  return true;
-}
-
 bool index_records(Input chunk, RecordIndex& index, RecordsError& error) noexcept {
   try {
     ByTopic<Indexed> topics;

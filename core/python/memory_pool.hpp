@@ -24,7 +24,7 @@ class MemoryPool {
   }
 
   void give(Memory memory) noexcept {
-    memory.clear();
+    memory.cut(0);
     const std::lock_guard<std::mutex> lock(mutex_);
     if (kept_.size() < kMost) kept_.push_back(std::move(memory));
   }
