@@ -4,7 +4,7 @@
 
 #include <memory>
 #include <mutex>
-#include <rosidl_adapter_proto/records.hpp>
+#include <rosidl_adapter_proto/memory.hpp>
 #include <utility>
 #include <vector>
 
@@ -37,20 +37,17 @@ class MemoryPool {
 };
 
 // Memory that goes back to its pool, which lives as long as any of it.
-class PooledMemory {
+class PooledMemory : public Memory {
  public:
   PooledMemory(Memory memory, std::shared_ptr<MemoryPool> pool)
-      : memory_(std::move(memory)), pool_(std::move(pool)) {}
+      : Memory(std::move(memory)), pool_(std::move(pool)) {}
   PooledMemory(PooledMemory&&) = default;
   PooledMemory& operator=(PooledMemory&&) = delete;
   ~PooledMemory() {
-    if (pool_) pool_->give(std::move(memory_));
+    if (pool_) pool_->give(std::move(*this));
   }
 
-  const Memory& memory() const { return memory_; }
-
  private:
-  Memory memory_;
   std::shared_ptr<MemoryPool> pool_;
 };
 

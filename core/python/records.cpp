@@ -176,7 +176,7 @@ nb::tuple index(nb::handle data) {
 // Memory as Python reads it: any number of views, none of which can change it.
 int view_memory(PyObject* self, Py_buffer* view, int flags) noexcept {
   static uint8_t nothing;
-  const Memory& memory = nb::inst_ptr<PooledMemory>(self)->memory();
+  const Memory& memory = *nb::inst_ptr<Memory>(self);
   void* const data = memory.size() == 0 ? &nothing : const_cast<uint8_t*>(memory.data());
   return PyBuffer_FillInfo(view, self, data, static_cast<Py_ssize_t>(memory.size()), 1, flags);
 }
@@ -257,7 +257,8 @@ void define_records(nb::module_& module) {
              nb::arg("publish_times"), nb::arg("messages"),
              "Return message records, one after the other, as they stand in a chunk.");
   module.def("index_records", &index, nb::arg());
-  nb::class_<PooledMemory>(module, "Memory", nb::type_slots(memory_slots));
+  nb::class_<Memory>(module, "Memory", nb::type_slots(memory_slots));
+  nb::class_<PooledMemory, Memory>(module, "PooledMemory");
   nb::class_<Converter>(module, "RecordConverter")
       .def(nb::init<nb::list>(), nb::arg("routes"))
       .def("_convert", &Converter::convert, nb::arg(), nb::arg(), nb::arg().none());
