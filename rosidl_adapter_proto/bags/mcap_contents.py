@@ -38,6 +38,8 @@ Damaged = Callable[[BagError], None]
 # Where a message or a chunk may begin, with a length below 2^48: how reading goes on behind what is no record.
 _CANDIDATE = re.compile(rb"[\x05\x06].{6}\x00\x00", re.DOTALL)
 _BELIEVABLE_RECORDS = 3
+# What ends the data: a damaged opcode must not end it sooner.
+_END_SIZES: dict[int, int] = {Opcode.DATA_END: 4, Opcode.FOOTER: 20}
 
 
 @dataclass
@@ -64,13 +66,11 @@ class Contents:
 
 
 def find_end(file: McapFile) -> int | None:
-    """Return the place behind the recording, which is the end of the file unless there is garbage behind it.
+    """Return the place behind the recording, looked for from the front: garbage may follow.
 
     Returns:
-        None if the recording was not finished, or is damaged.
+        None if the recording was not finished, or something is wrong on the way.
     """
-    if read_footer(file) is not None:
-        return file.size
     try:
         for place in file.places(len(MAGIC), file.size):
             end = place.end + len(MAGIC)
@@ -91,14 +91,13 @@ def read_footer(file: McapFile) -> records.Footer | None:
     return file.record(records.Footer, file.place(start, file.size))
 
 
-def read_summary(file: McapFile) -> Contents | None:
+def read_summary(file: McapFile, footer: records.Footer) -> Contents | None:
     """Return what the summary says; None if it leaves out some of it, as it may.
 
     Raises:
         BagError: The summary is damaged, or points to what is not there.
     """
-    footer = read_footer(file)
-    if footer is None or not footer.summary_start:
+    if not footer.summary_start:
         return None
     end = file.size - FOOTER_SIZE - len(MAGIC)
     if not len(MAGIC) <= footer.summary_start <= end:
@@ -152,7 +151,7 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
     contents = Contents()
     counts: Counter[int] = Counter()
     times: list[int] = []
-    for found in walk(file, file.size, damaged):
+    for found in walk(file, damaged):
         try:
             if isinstance(found, Place):
                 _add(contents, file, found)
@@ -170,33 +169,47 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
         counts.update(messages.topic_ids)
         if len(messages.log_times):
             times += min(messages.log_times), max(messages.log_times)
+    for topic_id in counts.keys() - contents.channels.keys():
+        damaged(
+            BagError(
+                f"{file.path}: {counts[topic_id]} messages are of channel {topic_id}, which is not there"
+            )
+        )
     contents.statistics = Statistics(dict(counts), min(times, default=0), max(times, default=0))
     return contents
 
 
-def walk(file: McapFile, end: int, damaged: Damaged) -> Iterator[Place | ChunkPlace | StoredChunk]:
-    """Yield what is in the data section, in its order: chunks, messages without one, and places of other records.
+def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | StoredChunk]:
+    """Yield what is in a file, in its order: chunks, messages without one, and places of other records.
 
     Args:
         file: The file.
-        end: Where the data section ends at the latest.
-        damaged: What to do where there is no record; if it returns, the next message or chunk is looked for.
+        damaged: What to do where there is no record; if it returns, the next message or chunk is looked for. Behind the
+            data, where no messages are lost, it is not called.
     """
-    start = len(MAGIC)
-    while start < end:
+    start, in_data = len(MAGIC), True
+    while start < file.size:
         try:
-            place = file.place(start, end)
-            if (place.opcode, place.end - place.content) in ((Opcode.DATA_END, 4), (Opcode.FOOTER, 20)):
-                return
+            place = file.place(start, file.size)
             found: Place | ChunkPlace | StoredChunk = place
             following = place.end
             if place.opcode == Opcode.MESSAGE:
-                found, following = file.loose_messages(place, end)
+                found, following = file.loose_messages(place)
             elif place.opcode == Opcode.CHUNK:
                 found = file.chunk(place)
+            elif place.opcode in _END_SIZES and place.end - place.content != _END_SIZES[place.opcode]:
+                raise file.damaged(place, f"it should have {_END_SIZES[place.opcode]} bytes")
+            elif place.opcode == Opcode.MESSAGE_INDEX and (place.end - place.content - 6) % 16:
+                raise file.damaged(place, "its last entry is not whole")
+            elif place.opcode == Opcode.DATA_END:
+                in_data = False
+            elif place.opcode == Opcode.FOOTER:
+                return
         except BagError as error:
+            if not in_data:
+                return
             damaged(error)
-            start = _find_record(file, start + 1, end)
+            start = _find_record(file, start + 1)
             continue
         yield found
         start = following
@@ -284,21 +297,21 @@ def _complete(contents: Contents, statistics: records.Statistics) -> bool:
     )
 
 
-def _find_record(file: McapFile, start: int, end: int) -> int:
-    """Return where the next chunk or message is, somewhere behind damage; `end` if there is none."""
-    while start < end:
-        piece_end = min(start + PIECE_SIZE, end)
-        for match in _CANDIDATE.finditer(file.read(start, piece_end)):
-            if _is_believable(file, start + match.start(), end):
+def _find_record(file: McapFile, start: int) -> int:
+    """Return where the next chunk or message is, somewhere behind damage; the end of the file if there is none."""
+    while start < file.size:
+        end = min(start + PIECE_SIZE, file.size)
+        for match in _CANDIDATE.finditer(file.read(start, end)):
+            if _is_believable(file, start + match.start()):
                 return start + match.start()
-        start = piece_end if piece_end == end else piece_end - RECORD_HEAD.size
-    return end
+        start = end if end == file.size else end - RECORD_HEAD.size
+    return file.size
 
 
-def _is_believable(file: McapFile, start: int, end: int) -> bool:
+def _is_believable(file: McapFile, start: int) -> bool:
     """Return whether a chunk begins at a place, or a message that other records follow."""
     try:
-        for place in islice(file.places(start, end), _BELIEVABLE_RECORDS):
+        for place in islice(file.places(start, file.size), _BELIEVABLE_RECORDS):
             if place.opcode == Opcode.CHUNK:
                 return file.chunk(place).compression in COMPRESSIONS
             if place.opcode not in tuple(Opcode):
