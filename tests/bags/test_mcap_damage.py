@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Sequence
 from io import BytesIO
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given, settings
@@ -86,371 +88,235 @@ def renamed(data: bytes) -> bytes:
 UNSURE = mcap_file(enable_crcs=False)
 SCHEMALESS = mcap_file([], more=lambda writer: writer.register_channel("/c", "cdr", 9))
 ATTACHED = mcap_file(more=lambda writer: writer.add_attachment(1, 2, "map.png", "image/png", b"pixels"))
-BYTES = {
-    "cut in a chunk": FILE[: FOURTH.start + 50],
-    "cut in the head of a record": FILE[: FOURTH.start + 5],
-    "cut in a message": LOOSE[: TENTH.start + 20],
-    "cut in the header": FILE[:20],
-    "zeros behind the end": FILE + bytes(5000),
-    "another recording behind the end": FILE + LOOSE,
-    "zeros instead of the end": FILE[: FOURTH.start] + bytes(5000),
-    "zeros instead of a chunk": change(FILE, FOURTH.start, bytes(FOURTH.end - FOURTH.start)),
-    "garbage between records": insert(FILE, FOURTH.start, b"garbage" * 20),
-    "garbage between messages": insert(LOOSE, TENTH.start, b"garbage" * 20)[:-400],
-    "a length that points outside": change(FILE, FOURTH.start + 1, struct.pack("<Q", 2**60)),
-    "a length that is too large": change(FILE, FOURTH.start + 1, struct.pack("<Q", 600)),
-    "a length that is too small": change(FILE, FOURTH.start + 1, struct.pack("<Q", 20)),
-    "a checksum of a chunk": change(FILE, FOURTH.content + 24, b"\1\2\3\4"),
-    "a size of a chunk": change(FILE, FOURTH.content + 16, struct.pack("<Q", 2**60)),
-    "a compression that is too long": change(FILE, FOURTH.content + 28, struct.pack("<I", 2**31)),
-    "a record inside a chunk": change(UNSURE, FOURTH.content + 40 + 1, struct.pack("<Q", 2**60)),
-    "a message that is too short": change(LOOSE, TENTH.start + 1, struct.pack("<Q", 5)),
-    "a summary nowhere": change(FILE, len(FILE) - 28, struct.pack("<Q", 2**60)),
-    "a summary in the header": change(FILE, len(FILE) - 28, struct.pack("<Q", 1)),
-    "a checksum of the summary": change(FILE, len(FILE) - 12, b"\1\2\3\4"),
-    "a count of messages": whole(change(FILE, STATISTICS.content, struct.pack("<Q", 41))),
-    "a count of chunks": whole(change(FILE, STATISTICS.content + 22, struct.pack("<I", 8))),
-    "counts that agree and are wrong": whole(
-        change(
-            change(FILE, STATISTICS.content, struct.pack("<Q", 41)),
-            STATISTICS.content + 48,
-            struct.pack("<Q", 28),
-        )
+
+
+class Damage(NamedTuple):
+    """A damaged file, and what becomes of it.
+
+    Attributes:
+        data: The file.
+        reason: What is wrong with it.
+        advice: What else is said where reading stops.
+        count: How many messages can be read.
+        before: What is said in front of the reason where reading goes on.
+        after: What is said behind it.
+    """
+
+    data: bytes
+    reason: str
+    advice: str = f"; {SKIP}"
+    count: int = 40
+    before: Sequence[str] = ()
+    after: Sequence[str] = ()
+
+
+DAMAGES = {
+    "cut in a chunk": Damage(
+        FILE[: FOURTH.start + 50],
+        "a.mcap at byte 1934: a Chunk record has 481 bytes, of which only 41 are there",
+        advice="; 19 messages are whole, and `--on-error skip` reads them",
+        count=19,
+        before=[f"a.mcap: {NO_END} 19 messages were found"],
     ),
-    "letters that are none": whole(FILE.replace(b"/b", b"/\xff")),
-    "two channels with one id": renamed(LOOSE),
-    "a schema that is missing": SCHEMALESS,
-    "an attachment that is not what it was": ATTACHED.replace(b"pixels", b"pixies"),
-    "an index of an attachment that points elsewhere": whole(
-        change(ATTACHED, places(ATTACHED, Opcode.ATTACHMENT_INDEX)[0].content, struct.pack("<Q", 8))
+    "cut in the head of a record": Damage(
+        FILE[: FOURTH.start + 5],
+        "a.mcap at byte 1934: 5 bytes are too few for a record",
+        advice="; 19 messages are whole, and `--on-error skip` reads them",
+        count=19,
+        before=[f"a.mcap: {NO_END} 19 messages were found"],
     ),
-    "an index of an attachment that points outside": whole(
-        change(ATTACHED, places(ATTACHED, Opcode.ATTACHMENT_INDEX)[0].content, struct.pack("<Q", 2**60))
+    "cut in a message": Damage(
+        LOOSE[: TENTH.start + 20],
+        "a.mcap at byte 863: a Message record has 41 bytes, of which only 11 are there",
+        advice="; 9 messages are whole, and `--on-error skip` reads them",
+        count=9,
+        before=[f"a.mcap: {NO_END} 9 messages were found"],
     ),
-    "a chunk that calls itself an index": change(FILE, FOURTH.start, bytes([Opcode.MESSAGE_INDEX])),
-    "an end in the middle": change(FILE, FOURTH.start, bytes([Opcode.DATA_END])),
-}
-EXPECTED: dict[str, tuple[str, int, list[str]]] = {
-    "cut in a chunk": (
-        (
-            "a.mcap at byte 1934: a Chunk record has 481 bytes, of which only 41 are there;"
-            " 19 messages are whole, and `--on-error skip` reads them"
-        ),
-        19,
-        [
-            f"a.mcap: {NO_END} 19 messages were found",
-            "a.mcap at byte 1934: a Chunk record has 481 bytes, of which only 41 are there",
-        ],
+    "cut in the header": Damage(
+        FILE[:20],
+        "a.mcap at byte 8: a Header record has 16 bytes, of which only 3 are there",
+        count=0,
+        after=[f"a.mcap: {NO_END} 0 messages were found"],
     ),
-    "cut in the head of a record": (
-        (
-            "a.mcap at byte 1934: 5 bytes are too few for a record;"
-            " 19 messages are whole, and `--on-error skip` reads them"
-        ),
-        19,
-        [f"a.mcap: {NO_END} 19 messages were found", "a.mcap at byte 1934: 5 bytes are too few for a record"],
+    "zeros behind the end": Damage(
+        FILE + bytes(5000), "a.mcap at byte 5403: the recording ends here, and 5000 bytes follow"
     ),
-    "cut in a message": (
-        (
-            "a.mcap at byte 863: a Message record has 41 bytes, of which only 11 are there;"
-            " 9 messages are whole, and `--on-error skip` reads them"
-        ),
-        9,
-        [
-            f"a.mcap: {NO_END} 9 messages were found",
-            "a.mcap at byte 863: a Message record has 41 bytes, of which only 11 are there",
-        ],
+    "another recording behind the end": Damage(
+        FILE + LOOSE, "a.mcap at byte 5403: the recording ends here, and 3584 bytes follow"
     ),
-    "cut in the header": (
-        f"a.mcap at byte 8: a Header record has 16 bytes, of which only 3 are there; {SKIP}",
-        0,
-        [
-            "a.mcap at byte 8: a Header record has 16 bytes, of which only 3 are there",
-            f"a.mcap: {NO_END} 0 messages were found",
-        ],
+    "zeros instead of the end": Damage(
+        FILE[: FOURTH.start] + bytes(5000),
+        "a.mcap at byte 1934: there is no record, its first byte is 0",
+        advice="; 19 messages are whole, and `--on-error skip` reads them",
+        count=19,
+        before=[f"a.mcap: {NO_END} 19 messages were found"],
     ),
-    "zeros behind the end": (
-        f"a.mcap at byte 5403: the recording ends here, and 5000 bytes follow; {SKIP}",
-        40,
-        ["a.mcap at byte 5403: the recording ends here, and 5000 bytes follow"],
-    ),
-    "another recording behind the end": (
-        f"a.mcap at byte 5403: the recording ends here, and 3584 bytes follow; {SKIP}",
-        40,
-        ["a.mcap at byte 5403: the recording ends here, and 3584 bytes follow"],
-    ),
-    "zeros instead of the end": (
-        (
-            "a.mcap at byte 1934: there is no record, its first byte is 0;"
-            " 19 messages are whole, and `--on-error skip` reads them"
-        ),
-        19,
-        [
-            f"a.mcap: {NO_END} 19 messages were found",
-            "a.mcap at byte 1934: there is no record, its first byte is 0",
-        ],
-    ),
-    "zeros instead of a chunk": (
-        f"a.mcap at byte 1934: there is no record, its first byte is 0; {SKIP}",
-        33,
-        [
-            "a.mcap at byte 1934: there is no record, its first byte is 0",
+    "zeros instead of a chunk": Damage(
+        change(FILE, FOURTH.start, bytes(FOURTH.end - FOURTH.start)),
+        "a.mcap at byte 1934: there is no record, its first byte is 0",
+        count=33,
+        after=[
             "a.mcap: the summary counts 7 chunks, and there are 6",
             "a.mcap: the summary counts 40 messages, and there are 33",
         ],
     ),
-    "garbage between records": (
-        (
-            "a.mcap at byte 4069: the summary is damaged: its checksum is 0x14efc15c and should be 0x8742a106;"
-            f" {SKIP}"
-        ),
-        40,
-        [
-            (
-                "a.mcap at byte 4069: the summary is damaged: its checksum is 0x14efc15c and should be"
-                " 0x8742a106"
-            ),
+    "garbage between records": Damage(
+        insert(FILE, FOURTH.start, b"garbage" * 20),
+        "a.mcap at byte 4069: the summary is damaged: its checksum is 0x14efc15c and should be" " 0x8742a106",
+        after=[
             f"a.mcap: {NOT_USED} 40 messages were found",
-            (
-                "a.mcap at byte 1934: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of which"
-                " only 3600 are there"
-            ),
+            "a.mcap at byte 1934: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of"
+            " which only 3600 are there",
         ],
     ),
-    "garbage between messages": (
-        (
-            "a.mcap at byte 863: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of which"
-            " only 2452 are there; 40 messages are whole, and `--on-error skip` reads them"
-        ),
-        40,
-        [
-            f"a.mcap: {NO_END} 40 messages were found",
-            (
-                "a.mcap at byte 863: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of which"
-                " only 2452 are there"
-            ),
-        ],
+    "garbage between messages": Damage(
+        insert(LOOSE, TENTH.start, b"garbage" * 20)[:-400],
+        "a.mcap at byte 863: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of"
+        " which only 2452 are there",
+        advice="; 40 messages are whole, and `--on-error skip` reads them",
+        before=[f"a.mcap: {NO_END} 40 messages were found"],
     ),
-    "a length that points outside": (
-        (
-            "a.mcap at byte 1934: a Chunk record has 1152921504606846976 bytes, of which only 3460 are there;"
-            f" {SKIP}"
-        ),
-        40,
-        [
-            "a.mcap at byte 1934: a Chunk record has 1152921504606846976 bytes, of which only 3460 are there",
-            "a.mcap: the summary counts 7 chunks, and there are 6",
-        ],
+    "a length that points outside": Damage(
+        change(FILE, FOURTH.start + 1, struct.pack("<Q", 2**60)),
+        "a.mcap at byte 1934: a Chunk record has 1152921504606846976 bytes, of which only 3460 are" " there",
+        after=["a.mcap: the summary counts 7 chunks, and there are 6"],
     ),
-    "a length that is too large": (
-        f"a.mcap at byte 1934: a Chunk record is damaged: it has 560 bytes of data and says 441; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 1934: a Chunk record is damaged: it has 560 bytes of data and says 441",
-            "a.mcap: the summary counts 7 chunks, and there are 6",
-        ],
+    "a length that is too large": Damage(
+        change(FILE, FOURTH.start + 1, struct.pack("<Q", 600)),
+        "a.mcap at byte 1934: a Chunk record is damaged: it has 560 bytes of data and says 441",
+        after=["a.mcap: the summary counts 7 chunks, and there are 6"],
     ),
-    "a length that is too small": (
-        f"a.mcap at byte 1934: a Chunk record is damaged: a length in it points behind its end; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 1934: a Chunk record is damaged: a length in it points behind its end",
-            "a.mcap: the summary counts 7 chunks, and there are 6",
-        ],
+    "a length that is too small": Damage(
+        change(FILE, FOURTH.start + 1, struct.pack("<Q", 20)),
+        "a.mcap at byte 1934: a Chunk record is damaged: a length in it points behind its end",
+        after=["a.mcap: the summary counts 7 chunks, and there are 6"],
     ),
-    "a checksum of a chunk": (
-        "a.mcap at byte 1934: the chunk is damaged: its checksum is 0x7d97c1f8 and should be 0x04030201",
-        33,
-        ["a.mcap at byte 1934: the chunk is damaged: its checksum is 0x7d97c1f8 and should be 0x04030201"],
+    "a checksum of a chunk": Damage(
+        change(FILE, FOURTH.content + 24, b"\1\2\3\4"),
+        "a.mcap at byte 1934: the chunk is damaged: its checksum is 0x7d97c1f8 and should be" " 0x04030201",
+        advice="",
+        count=33,
     ),
-    "a size of a chunk": (
-        (
-            "a.mcap at byte 1934: the chunk is damaged: it says that its 441 bytes become"
-            " 1152921504606846976, which is impossible"
-        ),
-        33,
-        [
-            (
-                "a.mcap at byte 1934: the chunk is damaged: it says that its 441 bytes become"
-                " 1152921504606846976, which is impossible"
+    "a size of a chunk": Damage(
+        change(FILE, FOURTH.content + 16, struct.pack("<Q", 2**60)),
+        "a.mcap at byte 1934: the chunk is damaged: it says that its 441 bytes become"
+        " 1152921504606846976, which is impossible",
+        advice="",
+        count=33,
+    ),
+    "a compression that is too long": Damage(
+        change(FILE, FOURTH.content + 28, struct.pack("<I", 2**31)),
+        "a.mcap at byte 1934: a Chunk record is damaged: a length in it points behind its end",
+        after=["a.mcap: the summary counts 7 chunks, and there are 6"],
+    ),
+    "a record inside a chunk": Damage(
+        change(UNSURE, FOURTH.content + 40 + 1, struct.pack("<Q", 2**60)),
+        "byte 0 of the chunk: a record of 1152921504606846976 bytes is announced and 432 are left;"
+        " the chunk is cut off or damaged",
+        advice="",
+        count=33,
+    ),
+    "a message that is too short": Damage(
+        change(LOOSE, TENTH.start + 1, struct.pack("<Q", 5)),
+        "a.mcap at byte 863: a Message record is damaged: it is too short for a message",
+        count=39,
+        after=["a.mcap: the summary counts 40 messages, and there are 39"],
+    ),
+    "a summary nowhere": Damage(
+        change(FILE, len(FILE) - 28, struct.pack("<Q", 2**60)),
+        "a.mcap at byte 5366: the summary should begin at byte 1152921504606846976, where it cannot",
+        after=[f"a.mcap: {NOT_USED} 40 messages were found"],
+    ),
+    "a summary in the header": Damage(
+        change(FILE, len(FILE) - 28, struct.pack("<Q", 1)),
+        "a.mcap at byte 5366: the summary should begin at byte 1, where it cannot",
+        after=[f"a.mcap: {NOT_USED} 40 messages were found"],
+    ),
+    "a checksum of the summary": Damage(
+        change(FILE, len(FILE) - 12, b"\1\2\3\4"),
+        "a.mcap at byte 4069: the summary is damaged: its checksum is 0x8742a106 and should be" " 0x04030201",
+        after=[f"a.mcap: {NOT_USED} 40 messages were found"],
+    ),
+    "a count of messages": Damage(
+        whole(change(FILE, STATISTICS.content, struct.pack("<Q", 41))),
+        "a.mcap at byte 4069: the summary counts 41 messages, and 40 in the sum of its topics",
+        after=[f"a.mcap: {NOT_USED} 40 messages were found"],
+    ),
+    "a count of chunks": Damage(
+        whole(change(FILE, STATISTICS.content + 22, struct.pack("<I", 8))),
+        "a.mcap: the summary counts 8 chunks, and there are 7",
+    ),
+    "counts that agree and are wrong": Damage(
+        whole(
+            change(
+                change(FILE, STATISTICS.content, struct.pack("<Q", 41)),
+                STATISTICS.content + 48,
+                struct.pack("<Q", 28),
             )
-        ],
-    ),
-    "a compression that is too long": (
-        f"a.mcap at byte 1934: a Chunk record is damaged: a length in it points behind its end; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 1934: a Chunk record is damaged: a length in it points behind its end",
-            "a.mcap: the summary counts 7 chunks, and there are 6",
-        ],
-    ),
-    "a record inside a chunk": (
-        (
-            "byte 0 of the chunk: a record of 1152921504606846976 bytes is announced and 432 are left;"
-            " the chunk is cut off or damaged"
         ),
-        33,
-        [
-            (
-                "byte 0 of the chunk: a record of 1152921504606846976 bytes is announced and 432 are left;"
-                " the chunk is cut off or damaged"
-            )
-        ],
+        "a.mcap: the summary counts 41 messages, and there are 40",
     ),
-    "a message that is too short": (
-        f"a.mcap at byte 863: a Message record is damaged: it is too short for a message; {SKIP}",
-        39,
-        [
-            "a.mcap at byte 863: a Message record is damaged: it is too short for a message",
-            "a.mcap: the summary counts 40 messages, and there are 39",
-        ],
-    ),
-    "a summary nowhere": (
-        (
-            "a.mcap at byte 5366: the summary should begin at byte 1152921504606846976, where it cannot;"
-            f" {SKIP}"
-        ),
-        40,
-        [
-            "a.mcap at byte 5366: the summary should begin at byte 1152921504606846976, where it cannot",
-            f"a.mcap: {NOT_USED} 40 messages were found",
-        ],
-    ),
-    "a summary in the header": (
-        f"a.mcap at byte 5366: the summary should begin at byte 1, where it cannot; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 5366: the summary should begin at byte 1, where it cannot",
-            f"a.mcap: {NOT_USED} 40 messages were found",
-        ],
-    ),
-    "a checksum of the summary": (
-        (
-            "a.mcap at byte 4069: the summary is damaged: its checksum is 0x8742a106 and should be 0x04030201;"
-            f" {SKIP}"
-        ),
-        40,
-        [
-            (
-                "a.mcap at byte 4069: the summary is damaged: its checksum is 0x8742a106 and should be"
-                " 0x04030201"
-            ),
-            f"a.mcap: {NOT_USED} 40 messages were found",
-        ],
-    ),
-    "a count of messages": (
-        f"a.mcap at byte 4069: the summary counts 41 messages, and 40 in the sum of its topics; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 4069: the summary counts 41 messages, and 40 in the sum of its topics",
-            f"a.mcap: {NOT_USED} 40 messages were found",
-        ],
-    ),
-    "a count of chunks": (
-        f"a.mcap: the summary counts 8 chunks, and there are 7; {SKIP}",
-        40,
-        ["a.mcap: the summary counts 8 chunks, and there are 7"],
-    ),
-    "counts that agree and are wrong": (
-        f"a.mcap: the summary counts 41 messages, and there are 40; {SKIP}",
-        40,
-        ["a.mcap: the summary counts 41 messages, and there are 40"],
-    ),
-    "letters that are none": (
-        f"a.mcap at byte 4312: a Channel record is damaged: a text in it is not UTF-8; {SKIP}",
-        38,
-        [
-            "a.mcap at byte 4312: a Channel record is damaged: a text in it is not UTF-8",
+    "letters that are none": Damage(
+        whole(FILE.replace(b"/b", b"/\xff")),
+        "a.mcap at byte 4312: a Channel record is damaged: a text in it is not UTF-8",
+        count=38,
+        after=[
             f"a.mcap: {NOT_USED} 38 messages were found",
             "a.mcap at byte 33: the chunk is damaged: its checksum is 0x764366db and should be 0xfba4dd0e",
             "a.mcap: 13 messages are of channel 2, which is not there",
             "a.mcap at byte 33: the chunk is damaged: its checksum is 0x764366db and should be 0xfba4dd0e",
         ],
     ),
-    "two channels with one id": (
-        f"a.mcap at byte 359: channel 2 is `/b` here, and another `/c` elsewhere; {SKIP}",
-        40,
-        ["a.mcap at byte 359: channel 2 is `/b` here, and another `/c` elsewhere"],
+    "two channels with one id": Damage(
+        renamed(LOOSE), "a.mcap at byte 359: channel 2 is `/b` here, and another `/c` elsewhere"
     ),
-    "a schema that is missing": (
-        f"a.mcap: channel 1 (`/c`) has schema 9, which is not there; {SKIP}",
-        0,
-        ["a.mcap: channel 1 (`/c`) has schema 9, which is not there"],
+    "a schema that is missing": Damage(
+        SCHEMALESS, "a.mcap: channel 1 (`/c`) has schema 9, which is not there", count=0
     ),
-    "an attachment that is not what it was": (
-        (
-            "a.mcap at byte 3786: an Attachment record is damaged: its checksum is 0xbebe7a4b and should be"
-            f" 0x66663866; {SKIP}"
+    "an attachment that is not what it was": Damage(
+        ATTACHED.replace(b"pixels", b"pixies"),
+        "a.mcap at byte 3786: an Attachment record is damaged: its checksum is 0xbebe7a4b and"
+        " should be 0x66663866",
+    ),
+    "an index of an attachment that points elsewhere": Damage(
+        whole(change(ATTACHED, places(ATTACHED, Opcode.ATTACHMENT_INDEX)[0].content, struct.pack("<Q", 8))),
+        "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be"
+        " at byte 8 and is not",
+        after=[f"a.mcap: {NOT_USED} 40 messages were found"],
+    ),
+    "an index of an attachment that points outside": Damage(
+        whole(
+            change(ATTACHED, places(ATTACHED, Opcode.ATTACHMENT_INDEX)[0].content, struct.pack("<Q", 2**60))
         ),
-        40,
-        [
-            (
-                "a.mcap at byte 3786: an Attachment record is damaged: its checksum is 0xbebe7a4b and should be"
-                " 0x66663866"
-            )
-        ],
+        "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be"
+        " at byte 1152921504606846976 and is not",
+        after=[f"a.mcap: {NOT_USED} 40 messages were found"],
     ),
-    "an index of an attachment that points elsewhere": (
-        (
-            "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be at"
-            f" byte 8 and is not; {SKIP}"
-        ),
-        40,
-        [
-            (
-                "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be at"
-                " byte 8 and is not"
-            ),
-            f"a.mcap: {NOT_USED} 40 messages were found",
-        ],
+    "a chunk that calls itself an index": Damage(
+        change(FILE, FOURTH.start, bytes([Opcode.MESSAGE_INDEX])),
+        "a.mcap at byte 1934: a MessageIndex record is damaged: its last entry is not whole",
+        after=["a.mcap: the summary counts 7 chunks, and there are 6"],
     ),
-    "an index of an attachment that points outside": (
-        (
-            "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be at"
-            f" byte 1152921504606846976 and is not; {SKIP}"
-        ),
-        40,
-        [
-            (
-                "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be at"
-                " byte 1152921504606846976 and is not"
-            ),
-            f"a.mcap: {NOT_USED} 40 messages were found",
-        ],
-    ),
-    "a chunk that calls itself an index": (
-        f"a.mcap at byte 1934: a MessageIndex record is damaged: its last entry is not whole; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 1934: a MessageIndex record is damaged: its last entry is not whole",
-            "a.mcap: the summary counts 7 chunks, and there are 6",
-        ],
-    ),
-    "an end in the middle": (
-        f"a.mcap at byte 1934: a DataEnd record is damaged: it should have 4 bytes; {SKIP}",
-        40,
-        [
-            "a.mcap at byte 1934: a DataEnd record is damaged: it should have 4 bytes",
-            "a.mcap: the summary counts 7 chunks, and there are 6",
-        ],
+    "an end in the middle": Damage(
+        change(FILE, FOURTH.start, bytes([Opcode.DATA_END])),
+        "a.mcap at byte 1934: a DataEnd record is damaged: it should have 4 bytes",
+        after=["a.mcap: the summary counts 7 chunks, and there are 6"],
     ),
 }
 
 
-@pytest.mark.parametrize("name", BYTES)
-def test_damage_is_named(name: str) -> None:
-    reason, _, _ = EXPECTED[name]
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_damage_is_named(damage: Damage) -> None:
     with pytest.raises((BagError, RecordsError)) as caught:
-        reader = reader_of(BYTES[name])
+        reader = reader_of(damage.data)
         list(messages_of(reader))
         list(reader.attachments())
-    assert str(caught.value) == reason
+    assert str(caught.value) == damage.reason + damage.advice
 
 
-@pytest.mark.parametrize("name", BYTES)
-def test_what_is_whole_can_be_read(name: str) -> None:
-    _, count, warnings = EXPECTED[name]
-    assert salvaged(BYTES[name]) == (count, warnings)
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_what_is_whole_can_be_read(damage: Damage) -> None:
+    assert salvaged(damage.data) == (damage.count, [*damage.before, damage.reason, *damage.after])
 
 
 @pytest.mark.parametrize(
