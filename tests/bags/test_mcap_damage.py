@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from io import BytesIO
-from typing import NamedTuple
 
 import pytest
 from hypothesis import given, settings
@@ -90,7 +90,8 @@ SCHEMALESS = mcap_file([], more=lambda writer: writer.register_channel("/c", "cd
 ATTACHED = mcap_file(more=lambda writer: writer.add_attachment(1, 2, "map.png", "image/png", b"pixels"))
 
 
-class Damage(NamedTuple):
+@dataclass(frozen=True)
+class Damage:
     """A damaged file, and what becomes of it.
 
     Attributes:
