@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 Damaged = Callable[[BagError], None]
 """What is called with each damage that is found: it raises it, or notes it, and then what can be read is read."""
 
-# Where a message or a chunk may begin, with a length below 2^48: how reading goes on behind what is no record.
-_CANDIDATE = re.compile(rb"[\x05\x06].{6}\x00\x00", re.DOTALL)
+# Where a schema, channel, message or chunk may begin, with a length below 2^48: how reading goes on behind what is no
+# record. The first three are also what an uncompressed chunk that was cut off has inside.
+_CANDIDATE = re.compile(rb"[\x03-\x06].{6}\x00\x00", re.DOTALL)
 _BELIEVABLE_RECORDS = 3
 # What ends the data: a damaged opcode must not end it sooner.
 _END_SIZES: dict[int, int] = {Opcode.DATA_END: 4, Opcode.FOOTER: 20}
@@ -184,7 +185,7 @@ def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | Stor
 
     Args:
         file: The file.
-        damaged: What to do where there is no record; if it returns, the next message or chunk is looked for. Behind the
+        damaged: What to do where there is no record; if it returns, the next record is looked for. Behind the
             data, where no messages are lost, it is not called.
     """
     start, in_data = len(MAGIC), True
@@ -298,7 +299,7 @@ def _complete(contents: Contents, statistics: records.Statistics) -> bool:
 
 
 def _find_record(file: McapFile, start: int) -> int:
-    """Return where the next chunk or message is, somewhere behind damage; the end of the file if there is none."""
+    """Return where the next record is, somewhere behind damage; the end of the file if there is none."""
     while start < file.size:
         end = min(start + PIECE_SIZE, file.size)
         for match in _CANDIDATE.finditer(file.read(start, end)):
@@ -309,7 +310,7 @@ def _find_record(file: McapFile, start: int) -> int:
 
 
 def _is_believable(file: McapFile, start: int) -> bool:
-    """Return whether a chunk begins at a place, or a message that other records follow."""
+    """Return whether a chunk begins at a place, or a record that others follow."""
     try:
         for place in islice(file.places(start, file.size), _BELIEVABLE_RECORDS):
             if place.opcode == Opcode.CHUNK:

@@ -57,7 +57,7 @@ class McapReader:
         contents = self._contents = self._read_contents()
         for error in missing_schemas(contents, path):
             self._damaged(error)
-        self.topics = read_topics(contents.channels, contents.schemas, contents.metadata)
+        self.topics = read_topics(contents.channels, contents.schemas, contents.metadata, path)
         self.statistics = contents.statistics
         self.metadata = [(record.name, record.metadata) for record in contents.metadata]
 
