@@ -15,6 +15,7 @@ from mcap.opcode import Opcode
 from rosidl_adapter_proto.bags.compression import COMPRESSIONS, records_of
 from rosidl_adapter_proto.bags.mcap_records import (
     FOOTER_SIZE,
+    KNOWN_OPCODES,
     MAGIC,
     PIECE_SIZE,
     RECORD_HEAD,
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 Damaged = Callable[[BagError], None]
 """What is called with each damage that is found: it raises it, or notes it, and then what can be read is read."""
+
+DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 
 # Where a schema, channel, message or chunk may begin, with a length below 2^48: how reading goes on behind what is no
 # record. The first three are also what an uncompressed chunk that was cut off has inside.
@@ -72,11 +75,15 @@ def find_end(file: McapFile) -> int | None:
     Returns:
         None if the recording was not finished, or something is wrong on the way.
     """
+
+    def stop(error: BagError) -> None:
+        raise error
+
     try:
-        for place in file.places(len(MAGIC), file.size):
-            end = place.end + len(MAGIC)
-            if place.opcode == Opcode.FOOTER and end <= file.size and file.read(place.end, end) == MAGIC:
-                return end
+        for found in walk(file, stop):
+            if isinstance(found, Place) and found.opcode == Opcode.FOOTER:
+                end = found.end + len(MAGIC)
+                return end if end <= file.size and file.read(found.end, end) == MAGIC else None
     except BagError:
         return None
     return None
@@ -114,25 +121,30 @@ def read_summary(file: McapFile, footer: records.Footer) -> Contents | None:
             )
     contents = Contents()
     statistics = None
+    # By place: what two indexes point to is there once.
+    metadata: dict[int, Place] = {}
+    attachments: dict[int, Place] = {}
     known_topics: dict[frozenset[int], frozenset[int]] = {}
     for place in file.places(footer.summary_start, end):
-        if place.opcode == Opcode.SCHEMA:
-            add_schema(contents, file.record(records.Schema, place), file.where(place.start))
-        elif place.opcode == Opcode.CHANNEL:
-            add_channel(contents, file.record(records.Channel, place), file.where(place.start))
+        if place.opcode in DEFINITIONS:
+            add_definition(
+                contents, place.opcode, file.read(place.content, place.end), file.where(place.start)
+            )
         elif place.opcode == Opcode.STATISTICS:
             statistics = file.record(records.Statistics, place)
         elif place.opcode == Opcode.METADATA_INDEX:
-            indexed = _indexed(file, file.record(records.MetadataIndex, place).offset, Opcode.METADATA, place)
-            contents.metadata.append(file.record(records.Metadata, indexed))
+            offset = file.record(records.MetadataIndex, place).offset
+            metadata[offset] = _indexed(file, offset, Opcode.METADATA, place)
         elif place.opcode == Opcode.ATTACHMENT_INDEX:
             offset = file.record(records.AttachmentIndex, place).offset
-            contents.attachments.append(_indexed(file, offset, Opcode.ATTACHMENT, place))
+            attachments[offset] = _indexed(file, offset, Opcode.ATTACHMENT, place)
         elif place.opcode == Opcode.CHUNK_INDEX:
             index = file.record(records.ChunkIndex, place)
             topics = frozenset(index.message_index_offsets)
             if topics:
                 contents.chunk_topics[index.chunk_start_offset] = known_topics.setdefault(topics, topics)
+    contents.metadata = [file.record(records.Metadata, place) for place in metadata.values()]
+    contents.attachments = list(attachments.values())
     if statistics is None or not _complete(contents, statistics):
         return None
     contents.statistics = Statistics(
@@ -160,7 +172,7 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
             chunk = file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
             messages = read_records(records_of(chunk))
             for opcode, content in messages.others:
-                _add_inside(contents, opcode, content, chunk.where)
+                add_definition(contents, opcode, content, chunk.where)
         except RecordsError as error:
             damaged(BagError(f"{chunk.where}: the chunk is damaged: {error}"))
             continue
@@ -204,8 +216,6 @@ def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | Stor
                 raise file.damaged(place, "its last entry is not whole")
             elif place.opcode == Opcode.DATA_END:
                 in_data = False
-            elif place.opcode == Opcode.FOOTER:
-                return
         except BagError as error:
             if not in_data:
                 return
@@ -213,33 +223,32 @@ def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | Stor
             start = _find_record(file, start + 1)
             continue
         yield found
+        if place.opcode == Opcode.FOOTER:
+            return
         start = following
 
 
-def add_schema(contents: Contents, schema: records.Schema, where: str) -> None:
-    """Add a schema, which may be there several times.
+def add_definition(contents: Contents, opcode: int, content: Buffer, where: str) -> None:
+    """Add a schema or a channel, which may be there several times; other kinds of records are left out.
 
     Raises:
-        BagError: There is another one with its id.
+        BagError: It is damaged, or there is another one with its id.
     """
-    known = contents.schemas.setdefault(schema.id, schema)
-    if known != schema:
-        raise BagError(
-            f"{where}: schema {schema.id} is `{schema.name}` here, and another `{known.name}` elsewhere"
-        )
-
-
-def add_channel(contents: Contents, channel: records.Channel, where: str) -> None:
-    """Add a channel, which may be there several times.
-
-    Raises:
-        BagError: There is another one with its id.
-    """
-    known = contents.channels.setdefault(channel.id, channel)
-    if known != channel:
-        raise BagError(
-            f"{where}: channel {channel.id} is `{channel.topic}` here, and another `{known.topic}` elsewhere"
-        )
+    what = f"{where}: {opcode_name(opcode)}"
+    if opcode == Opcode.SCHEMA:
+        schema = parse(records.Schema, content, what)
+        other = contents.schemas.setdefault(schema.id, schema)
+        if schema != other:
+            raise BagError(
+                f"{where}: schema {schema.id} is `{schema.name}` here, and another `{other.name}` elsewhere"
+            )
+    elif opcode == Opcode.CHANNEL:
+        channel = parse(records.Channel, content, what)
+        known = contents.channels.setdefault(channel.id, channel)
+        if channel != known:
+            raise BagError(
+                f"{where}: channel {channel.id} is `{channel.topic}` here, and another `{known.topic}` elsewhere"
+            )
 
 
 def missing_schemas(contents: Contents, path: str) -> list[BagError]:
@@ -255,23 +264,12 @@ def missing_schemas(contents: Contents, path: str) -> list[BagError]:
 
 def _add(contents: Contents, file: McapFile, place: Place) -> None:
     """Add a record of the data section."""
-    if place.opcode == Opcode.SCHEMA:
-        add_schema(contents, file.record(records.Schema, place), file.where(place.start))
-    elif place.opcode == Opcode.CHANNEL:
-        add_channel(contents, file.record(records.Channel, place), file.where(place.start))
+    if place.opcode in DEFINITIONS:
+        add_definition(contents, place.opcode, file.read(place.content, place.end), file.where(place.start))
     elif place.opcode == Opcode.METADATA:
         contents.metadata.append(file.record(records.Metadata, place))
     elif place.opcode == Opcode.ATTACHMENT:
         contents.attachments.append(place)
-
-
-def _add_inside(contents: Contents, opcode: int, content: Buffer, where: str) -> None:
-    """Add a record that is inside a chunk."""
-    what = f"{where}: {opcode_name(opcode)} in the chunk"
-    if opcode == Opcode.SCHEMA:
-        add_schema(contents, parse(records.Schema, content, what), where)
-    elif opcode == Opcode.CHANNEL:
-        add_channel(contents, parse(records.Channel, content, what), where)
 
 
 def _indexed(file: McapFile, offset: int, opcode: Opcode, index: Place) -> Place:
@@ -302,7 +300,11 @@ def _find_record(file: McapFile, start: int) -> int:
     """Return where the next record is, somewhere behind damage; the end of the file if there is none."""
     while start < file.size:
         end = min(start + PIECE_SIZE, file.size)
-        for match in _CANDIDATE.finditer(file.read(start, end)):
+        try:
+            piece = file.read(start, end)
+        except BagError:
+            piece = b""  # a part of the disk that cannot be read, which was said at the first record in it
+        for match in _CANDIDATE.finditer(piece):
             if _is_believable(file, start + match.start()):
                 return start + match.start()
         start = end if end == file.size else end - RECORD_HEAD.size
@@ -315,7 +317,7 @@ def _is_believable(file: McapFile, start: int) -> bool:
         for place in islice(file.places(start, file.size), _BELIEVABLE_RECORDS):
             if place.opcode == Opcode.CHUNK:
                 return file.chunk(place).compression in COMPRESSIONS
-            if place.opcode not in tuple(Opcode):
+            if place.opcode not in KNOWN_OPCODES:
                 return False
     except BagError:
         return False

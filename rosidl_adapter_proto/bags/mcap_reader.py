@@ -10,9 +10,9 @@ from mcap import records
 from mcap.opcode import Opcode
 
 from rosidl_adapter_proto.bags.mcap_contents import (
+    DEFINITIONS,
     Contents,
-    add_channel,
-    add_schema,
+    add_definition,
     find_end,
     missing_schemas,
     read_footer,
@@ -20,7 +20,7 @@ from rosidl_adapter_proto.bags.mcap_contents import (
     scan,
     walk,
 )
-from rosidl_adapter_proto.bags.mcap_records import MAGIC, ChunkPlace, McapFile, Place
+from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, Place
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
 from rosidl_adapter_proto.errors import BagError
@@ -98,7 +98,7 @@ class McapReader:
             chunk_count += isinstance(found, ChunkPlace)
             message_counts.append(found.message_count if isinstance(found, StoredChunk) else None)
             if _in_time(found, selection) and self._has_topics(found, selection):
-                chunk = self._file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
+                chunk = self._stored_chunk(found)
         if chunk is not None:
             yield replace(chunk, message_count=message_counts[-1])
         self._check_counts(chunk_count, message_counts)
@@ -167,18 +167,19 @@ class McapReader:
         self._warnings[warning] = None
 
     def _check(self, place: Place) -> None:
-        """Compare a record of the data section with what is known of the file."""
+        """Compare a record with what is known of the file."""
         where = self._file.where(place.start)
+        if place.opcode not in KNOWN_OPCODES:
+            self._warn(f"{where}: {place.name} is left out")
+        if place.opcode not in DEFINITIONS:
+            return
+        channels = self._contents.channels
         try:
-            if place.opcode == Opcode.SCHEMA:
-                add_schema(self._contents, self._file.record(records.Schema, place), where)
-            elif place.opcode == Opcode.CHANNEL:
-                channel = self._file.record(records.Channel, place)
-                add_channel(self._contents, channel, where)
-                if channel.id not in self.topics:
-                    raise BagError(f"{where}: channel {channel.id} (`{channel.topic}`) is not in the summary")
-            elif place.opcode not in tuple(Opcode):
-                self._warn(f"{where}: {place.name} is left out")
+            add_definition(self._contents, place.opcode, self._file.read(place.content, place.end), where)
+            for topic_id in channels.keys() - self.topics.keys():
+                raise BagError(
+                    f"{self.path}: channel {topic_id} (`{channels[topic_id].topic}`) is not in the summary"
+                )
         except BagError as error:
             self._damaged(error)
 
@@ -199,6 +200,16 @@ class McapReader:
                     f"{self.path}: the summary counts {message_count} messages, and there are {sum(counts)}"
                 )
             )
+
+    def _stored_chunk(self, found: ChunkPlace | StoredChunk) -> StoredChunk | None:
+        """Return a chunk with its data; None if it cannot be read, which is noted."""
+        if isinstance(found, StoredChunk):
+            return found
+        try:
+            return self._file.stored_chunk(found)
+        except BagError as error:
+            self._damaged(error)
+            return None
 
     def _has_topics(self, chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
         """Return whether a chunk may have messages of the topics of a selection, as far as the summary says."""

@@ -35,12 +35,14 @@ FOOTER_SIZE = RECORD_HEAD.size + 20
 
 # What is read at once has bounds, whatever a file says. Kinds that we do not know are never read.
 _LARGEST_RECORDS = {
-    **dict.fromkeys(Opcode, 256 * 1024 * 1024),
+    **dict.fromkeys(Opcode, 64 * 1024 * 1024),
+    Opcode.MESSAGE_INDEX: MAXIMUM_CHUNK_SIZE,
     Opcode.CHUNK: MAXIMUM_CHUNK_SIZE,
     Opcode.MESSAGE: MAXIMUM_CHUNK_SIZE,
     Opcode.ATTACHMENT: MAXIMUM_CHUNK_SIZE,
 }
 _LONGEST_COMPRESSION = 32
+KNOWN_OPCODES = frozenset(Opcode)
 PIECE_SIZE = 1024 * 1024
 """How much is read at once where nothing else says."""
 
@@ -107,8 +109,11 @@ class McapFile:
 
     def read(self, start: int, end: int) -> bytes:
         """Return the bytes from one place to another, both in the file."""
-        self._file.seek(start)
-        data = self._file.read(end - start)
+        try:
+            self._file.seek(start)
+            data = self._file.read(end - start)
+        except OSError as error:
+            raise BagError(f"{self.where(start)}: it cannot be read: {error.strerror or error}") from error
         if len(data) != end - start:
             raise BagError(f"{self.where(start)}: the file became shorter while it was read")
         return data

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -15,6 +17,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType
 
 from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_records import MAGIC, McapFile, Place
 from rosidl_adapter_proto.bags.model import Selection
 from rosidl_adapter_proto.errors import BagError
@@ -343,6 +346,60 @@ def test_records_of_unknown_kinds_are_left_out() -> None:
     reader = reader_of(insert(data, place, record))
     assert tuple(messages_of(reader)) == MESSAGES
     assert reader.warnings[1:] == [f"a.mcap at byte {place}: a record of the unknown kind 0x83 is left out"]
+
+
+class Broken(BytesIO):
+    """A file on a disk with a byte that cannot be read."""
+
+    def read(self, size: int | None = -1) -> bytes:
+        if size is None or self.tell() <= 2200 < self.tell() + size:
+            raise OSError(5, "Input/output error")
+        return super().read(size)
+
+
+def test_a_disk_that_cannot_be_read() -> None:
+    reason = "a.mcap at byte 1983: it cannot be read: Input/output error"
+    with pytest.raises(BagError) as caught:
+        list(McapReader(Broken(FILE), "a.mcap").chunks())
+    assert str(caught.value) == f"{reason}; {SKIP}"
+    reader = McapReader(Broken(FILE), "a.mcap", salvage=True)
+    assert len(list(messages_of(reader))) == 33
+    assert reader.warnings == [reason]
+
+
+def test_no_more_memory_is_taken_than_a_record_may_need(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    path.write_bytes(FILE[: CHUNKS[0].start] + b"\x04" + struct.pack("<Q", 2**27))
+    os.truncate(path, 2**28)
+    with path.open("rb") as file, pytest.raises(BagError) as caught:
+        McapReader(file, "a.mcap")
+    assert str(caught.value) == (
+        "a.mcap at byte 33: a Channel record has 134217728 bytes; up to 67108864 are read;"
+        " 0 messages are whole, and `--on-error skip` reads them"
+    )
+
+
+def test_a_file_that_becomes_shorter() -> None:
+    file = McapFile(BytesIO(FILE), "a.mcap")
+    with pytest.raises(BagError) as caught:
+        file.read(5000, 6000)
+    assert str(caught.value) == "a.mcap at byte 5000: the file became shorter while it was read"
+
+
+def test_what_is_indexed_twice_is_there_once() -> None:
+    index = places(ATTACHED, Opcode.ATTACHMENT_INDEX)[0]
+    reader = reader_of(whole(insert(ATTACHED, index.start, ATTACHED[index.start : index.end])))
+    assert [attachment.name for attachment in reader.attachments()] == ["map.png"]
+
+
+def test_a_channel_that_the_summary_does_not_have() -> None:
+    data = mcap_file(use_chunking=False, more=lambda writer: writer.register_channel("/c", "cdr", 1))
+    channel = places(data, Opcode.CHANNEL)[-1]
+    statistics = places(data, Opcode.STATISTICS)[0]
+    hidden = change(data, channel.start, b"\x83")
+    hidden = whole(change(hidden, statistics.content + 10, struct.pack("<I", 2)))
+    unknown = f"a.mcap at byte {channel.start}: a record of the unknown kind 0x83 is left out"
+    assert salvaged(hidden) == (40, ["a.mcap: channel 3 (`/c`) is not in the summary", unknown])
 
 
 FILES = [
