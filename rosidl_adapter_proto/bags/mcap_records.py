@@ -215,7 +215,7 @@ class McapFile:
             where, place.start, data_start, data_size, compression, size, crc, start_time, end_time
         )
 
-    def stored_chunk(self, chunk: ChunkPlace, message_count: int | None = None) -> StoredChunk:
+    def stored_chunk(self, chunk: ChunkPlace) -> StoredChunk:
         """Return a chunk with its data."""
         data = self.read(chunk.data_start, chunk.data_start + chunk.data_size)
         return StoredChunk(
@@ -226,7 +226,6 @@ class McapFile:
             chunk.crc,
             chunk.start_time,
             chunk.end_time,
-            message_count,
         )
 
     def loose_messages(self, first: Place) -> tuple[StoredChunk, int]:
@@ -276,7 +275,7 @@ def parse(kind: type[_Record], content: Buffer, what: str) -> _Record:
     """
     try:
         record: _Record = kind.read(_ExactStream(BytesIO(content)))  # type: ignore[attr-defined]
-    except EndOfFile as error:
+    except (EndOfFile, OverflowError) as error:
         raise BagError(f"{what} is damaged: a length in it points behind its end") from error
     except UnicodeDecodeError as error:
         raise BagError(f"{what} is damaged: a text in it is not UTF-8") from error

@@ -283,6 +283,10 @@ DAMAGES = {
         "a.mcap at byte 3786: an Attachment record is damaged: its checksum is 0xbebe7a4b and"
         " should be 0x66663866",
     ),
+    "a length in an attachment": Damage(
+        change(ATTACHED, places(ATTACHED, Opcode.ATTACHMENT)[0].content + 40, b"\xff" * 8),
+        "a.mcap at byte 3786: an Attachment record is damaged: a length in it points behind its end",
+    ),
     "an index of an attachment that points elsewhere": Damage(
         whole(change(ATTACHED, places(ATTACHED, Opcode.ATTACHMENT_INDEX)[0].content, struct.pack("<Q", 8))),
         "a.mcap at byte 5277: an AttachmentIndex record is damaged: an Attachment record should be"
