@@ -153,6 +153,8 @@ def _form(recording: Recording, destination: Path, settings: Settings) -> tuple[
         raise RequestError(f"storage {storage!r} cannot be written; {' and '.join(_WRITTEN)} can")
     if by_name not in (None, storage):
         raise RequestError(f"{destination} ends as a file of {by_name}, and the storage is to be {storage}")
+    if storage == SQLITE3 and settings.compression not in (None, "none"):
+        raise RequestError("files of sqlite3 are not compressed; leave --compression out, or write mcap")
     if by_name and len(recording.files) > 1:
         raise RequestError(
             f"{recording.path} has {len(recording.files)} files, each of which becomes one: "
