@@ -170,6 +170,9 @@ PyMethodDef transcoder_methods[] = {
      "cdr_to_proto($self, data, /)\n--\n\nTurn a serialized ROS message into a serialized protobuf message."},
     {"proto_to_cdr", transcode<ProtoToCdr>, METH_O,
      "proto_to_cdr($self, data, /)\n--\n\nTurn a serialized protobuf message into a serialized ROS message."},
+    {"ros1_to_proto", transcode<Ros1ToProto>, METH_O,
+     "ros1_to_proto($self, data, /)\n--\n\nTurn a message serialized by ROS 1 into a serialized protobuf "
+     "message."},
     {nullptr, nullptr, 0, nullptr}};
 PyType_Slot transcoder_slots[] = {{Py_tp_methods, transcoder_methods}, {0, nullptr}};
 

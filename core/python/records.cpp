@@ -188,6 +188,7 @@ Treatment treatment_of(const std::string& name) {
   if (name == "copy") return Treatment::Copy;
   if (name == "cdr_to_proto") return Treatment::CdrToProto;
   if (name == "proto_to_cdr") return Treatment::ProtoToCdr;
+  if (name == "ros1_to_proto") return Treatment::Ros1ToProto;
   throw nb::value_error("a route has an unknown direction");
 }
 

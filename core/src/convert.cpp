@@ -18,12 +18,16 @@ class Steps {
     if (route.treatment == Treatment::ProtoToCdr)
       return measure_proto_to_cdr(*route.plan, message, route.size_limit, *fields_, size, error);
     lengths_.clear();
+    if (route.treatment == Treatment::Ros1ToProto)
+      return measure_ros1_to_proto(*route.plan, message, route.size_limit, lengths_, size, error);
     return measure_cdr_to_proto(*route.plan, message, route.size_limit, lengths_, size, error);
   }
 
   bool write(const Route& route, Input message, Output output, Error& error) {
     if (route.treatment == Treatment::ProtoToCdr)
       return write_proto_to_cdr(*route.plan, message, *fields_, output, error);
+    if (route.treatment == Treatment::Ros1ToProto)
+      return write_ros1_to_proto(*route.plan, message, lengths_, 0, output, error);
     return write_cdr_to_proto(*route.plan, message, lengths_, 0, output, error);
   }
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import re
-import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from mcap import records
 from mcap.opcode import Opcode
 
-from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.compression import COMPRESSIONS, records_of
 from rosidl_adapter_proto.bags.mcap_records import (
     FOOTER_SIZE,
     MAGIC,
+    PIECE_SIZE,
     RECORD_HEAD,
     ChunkPlace,
     McapFile,
@@ -34,10 +35,9 @@ if TYPE_CHECKING:
 Damaged = Callable[[BagError], None]
 """What is called with each damage that is found: it raises it, or notes it, and then what can be read is read."""
 
-# A chunk with a compression that we know: how reading goes on behind bytes that are no record.
-_CHUNK = re.compile(rb"\x06.{7}\x00.{28}(?:\x00{4}|\x03\x00{3}lz4|\x04\x00{3}zstd)", re.DOTALL)
-_LONGEST_CHUNK_HEAD = 64
-_PIECE_SIZE = 1024 * 1024
+# Where a message or a chunk may begin, with a length below 2^48: how reading goes on behind what is no record.
+_CANDIDATE = re.compile(rb"[\x05\x06].{6}\x00\x00", re.DOTALL)
+_BELIEVABLE_RECORDS = 3
 
 
 @dataclass
@@ -63,6 +63,24 @@ class Contents:
     chunk_topics: dict[int, frozenset[int]] = field(default_factory=dict)
 
 
+def find_end(file: McapFile) -> int | None:
+    """Return the place behind the recording, which is the end of the file unless there is garbage behind it.
+
+    Returns:
+        None if the recording was not finished, or is damaged.
+    """
+    if read_footer(file) is not None:
+        return file.size
+    try:
+        for place in file.places(len(MAGIC), file.size):
+            end = place.end + len(MAGIC)
+            if place.opcode == Opcode.FOOTER and end <= file.size and file.read(place.end, end) == MAGIC:
+                return end
+    except BagError:
+        return None
+    return None
+
+
 def read_footer(file: McapFile) -> records.Footer | None:
     """Return the footer, which is at the end of a file that was finished; None where the end is missing."""
     start = file.size - FOOTER_SIZE - len(MAGIC)
@@ -73,21 +91,22 @@ def read_footer(file: McapFile) -> records.Footer | None:
     return file.record(records.Footer, file.place(start, file.size))
 
 
-def read_summary(file: McapFile, footer: records.Footer) -> Contents | None:
+def read_summary(file: McapFile) -> Contents | None:
     """Return what the summary says; None if it leaves out some of it, as it may.
 
     Raises:
         BagError: The summary is damaged, or points to what is not there.
     """
-    end = file.size - FOOTER_SIZE - len(MAGIC)
-    if not footer.summary_start:
+    footer = read_footer(file)
+    if footer is None or not footer.summary_start:
         return None
+    end = file.size - FOOTER_SIZE - len(MAGIC)
     if not len(MAGIC) <= footer.summary_start <= end:
         raise BagError(
             f"{file.where(end)}: the summary should begin at byte {footer.summary_start}, where it cannot"
         )
     if footer.summary_crc:
-        crc = zlib.crc32(file.read(footer.summary_start, file.size - len(MAGIC) - 4))
+        crc = file.crc(footer.summary_start, file.size - len(MAGIC) - 4)
         if crc != footer.summary_crc:
             raise BagError(
                 f"{file.where(footer.summary_start)}: the summary is damaged: its checksum is {crc:#010x} and should be"
@@ -161,13 +180,13 @@ def walk(file: McapFile, end: int, damaged: Damaged) -> Iterator[Place | ChunkPl
     Args:
         file: The file.
         end: Where the data section ends at the latest.
-        damaged: What to do where there is no record; if it returns, the next chunk is looked for.
+        damaged: What to do where there is no record; if it returns, the next message or chunk is looked for.
     """
     start = len(MAGIC)
     while start < end:
         try:
             place = file.place(start, end)
-            if place.opcode in (Opcode.DATA_END, Opcode.FOOTER):
+            if (place.opcode, place.end - place.content) in ((Opcode.DATA_END, 4), (Opcode.FOOTER, 20)):
                 return
             found: Place | ChunkPlace | StoredChunk = place
             following = place.end
@@ -177,7 +196,7 @@ def walk(file: McapFile, end: int, damaged: Damaged) -> Iterator[Place | ChunkPl
                 found = file.chunk(place)
         except BagError as error:
             damaged(error)
-            start = _next_chunk(file, start + 1, end)
+            start = _find_record(file, start + 1, end)
             continue
         yield found
         start = following
@@ -207,6 +226,17 @@ def add_channel(contents: Contents, channel: records.Channel, where: str) -> Non
         raise BagError(
             f"{where}: channel {channel.id} is `{channel.topic}` here, and another `{known.topic}` elsewhere"
         )
+
+
+def missing_schemas(contents: Contents, path: str) -> list[BagError]:
+    """Return an error for each channel whose schema is not in the file."""
+    return [
+        BagError(
+            f"{path}: channel {channel.id} (`{channel.topic}`) has schema {channel.schema_id}, which is not there"
+        )
+        for channel in contents.channels.values()
+        if channel.schema_id and channel.schema_id not in contents.schemas
+    ]
 
 
 def _add(contents: Contents, file: McapFile, place: Place) -> None:
@@ -254,5 +284,25 @@ def _complete(contents: Contents, statistics: records.Statistics) -> bool:
     )
 
 
-def _next_chunk(file: McapFile, start: int, end: int) -> int:
+def _find_record(file: McapFile, start: int, end: int) -> int:
+    """Return where the next chunk or message is, somewhere behind damage; `end` if there is none."""
+    while start < end:
+        piece_end = min(start + PIECE_SIZE, end)
+        for match in _CANDIDATE.finditer(file.read(start, piece_end)):
+            if _is_believable(file, start + match.start(), end):
+                return start + match.start()
+        start = piece_end if piece_end == end else piece_end - RECORD_HEAD.size
     return end
+
+
+def _is_believable(file: McapFile, start: int, end: int) -> bool:
+    """Return whether a chunk begins at a place, or a message that other records follow."""
+    try:
+        for place in islice(file.places(start, end), _BELIEVABLE_RECORDS):
+            if place.opcode == Opcode.CHUNK:
+                return file.chunk(place).compression in COMPRESSIONS
+            if place.opcode not in tuple(Opcode):
+                return False
+    except BagError:
+        return False
+    return True

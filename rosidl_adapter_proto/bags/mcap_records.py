@@ -7,6 +7,7 @@ Everything that can be wrong with a record ends here as a `BagError` with its pl
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
@@ -17,7 +18,8 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 
-from rosidl_adapter_proto.bags.model import StoredChunk
+from rosidl_adapter_proto.bags.model import Attachment, StoredChunk
+from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE
 from rosidl_adapter_proto.errors import BagError
 
 if TYPE_CHECKING:
@@ -31,8 +33,16 @@ MESSAGE_HEAD = struct.Struct("<BQHIQQ")
 """Of a message, with the head of its record: opcode, length, channel, sequence, log time, publish time."""
 FOOTER_SIZE = RECORD_HEAD.size + 20
 
+# What is read at once has bounds, whatever a file says. Kinds that we do not know are never read.
+_LARGEST_RECORDS = {
+    **dict.fromkeys(Opcode, 256 * 1024 * 1024),
+    Opcode.CHUNK: MAXIMUM_CHUNK_SIZE,
+    Opcode.MESSAGE: MAXIMUM_CHUNK_SIZE,
+    Opcode.ATTACHMENT: MAXIMUM_CHUNK_SIZE,
+}
 _LONGEST_COMPRESSION = 32
-_PIECE_SIZE = 1024 * 1024
+PIECE_SIZE = 1024 * 1024
+"""How much is read at once where nothing else says."""
 
 _Record = TypeVar("_Record", bound=records.McapRecord)
 
@@ -72,6 +82,7 @@ class ChunkPlace:
     crc: int
     start_time: int
     end_time: int
+    message_count: int | None = None
 
 
 class McapFile:
@@ -103,6 +114,13 @@ class McapFile:
             raise BagError(f"{self.where(start)}: the file became shorter while it was read")
         return data
 
+    def crc(self, start: int, end: int) -> int:
+        """Return the CRC-32 of the bytes from one place to another, both in the file."""
+        crc = 0
+        for piece in range(start, end, PIECE_SIZE):
+            crc = zlib.crc32(self.read(piece, min(piece + PIECE_SIZE, end)), crc)
+        return crc
+
     def place(self, start: int, limit: int) -> Place:
         """Return where the record is that begins at `start` and ends at `limit` or before.
 
@@ -111,16 +129,19 @@ class McapFile:
         """
         content = start + RECORD_HEAD.size
         if content > limit:
-            raise BagError(
-                f"{self.where(start)}: {limit - start} bytes are too few for a record: {_cut(limit, self.size)}"
-            )
+            raise BagError(f"{self.where(start)}: {limit - start} bytes are too few for a record")
         opcode, length = RECORD_HEAD.unpack(self.read(start, content))
         if opcode == 0:
             raise BagError(f"{self.where(start)}: there is no record, its first byte is 0")
         if length > limit - content:
+            there = limit - content
             raise BagError(
-                f"{self.where(start)}: {opcode_name(opcode)} of {length} bytes, of which only {limit - content} are"
-                f" there: {_cut(limit, self.size)}"
+                f"{self.where(start)}: {opcode_name(opcode)} has {length} bytes, of which only {there} are there"
+            )
+        largest = _LARGEST_RECORDS.get(opcode, length)
+        if length > largest:
+            raise BagError(
+                f"{self.where(start)}: {opcode_name(opcode)} has {length} bytes; up to {largest} are read"
             )
         return Place(opcode, start, content, content + length)
 
@@ -138,6 +159,25 @@ class McapFile:
             BagError: Its content is damaged.
         """
         return parse(kind, self.read(place.content, place.end), f"{self.where(place.start)}: {place.name}")
+
+    def attachment(self, place: Place) -> Attachment:
+        """Return an attachment, compared with its checksum.
+
+        Raises:
+            BagError: It is damaged.
+        """
+        attachment = self.record(records.Attachment, place)
+        stated = int.from_bytes(self.read(place.end - 4, place.end), "little")
+        crc = self.crc(place.content, place.end - 4)
+        if stated not in (0, crc):
+            raise self.damaged(place, f"its checksum is {crc:#010x} and should be {stated:#010x}")
+        return Attachment(
+            attachment.name,
+            attachment.media_type,
+            attachment.log_time,
+            attachment.create_time,
+            attachment.data,
+        )
 
     def damaged(self, place: Place, reason: str) -> BagError:
         """Return the error for a record whose content is wrong."""
@@ -171,7 +211,7 @@ class McapFile:
             where, place.start, data_start, data_size, compression, size, crc, start_time, end_time
         )
 
-    def stored_chunk(self, chunk: ChunkPlace, message_count: int | None = None) -> StoredChunk:
+    def stored_chunk(self, chunk: ChunkPlace) -> StoredChunk:
         """Return a chunk with its data."""
         data = self.read(chunk.data_start, chunk.data_start + chunk.data_size)
         return StoredChunk(
@@ -182,7 +222,8 @@ class McapFile:
             chunk.crc,
             chunk.start_time,
             chunk.end_time,
-            message_count,
+            chunk.message_count,
+            chunk.start,
         )
 
     def loose_messages(self, first: Place, limit: int) -> tuple[StoredChunk, int]:
@@ -194,7 +235,7 @@ class McapFile:
             first: The first of them.
             limit: The place behind the last record of the file that may be one.
         """
-        piece = self.read(first.start, max(first.end, min(first.start + _PIECE_SIZE, limit)))
+        piece = self.read(first.start, max(first.end, min(first.start + PIECE_SIZE, limit)))
         position, count, start_time, end_time = 0, 0, 2**64 - 1, 0
         while position + MESSAGE_HEAD.size <= len(piece):
             opcode, length, _, _, log_time, _ = MESSAGE_HEAD.unpack_from(piece, position)
@@ -208,7 +249,8 @@ class McapFile:
             raise self.damaged(first, "it is too short for a message")
         data = memoryview(piece)[:position]
         where = self.where(first.start)
-        return StoredChunk(where, data, "", position, 0, start_time, end_time, count), first.start + position
+        chunk = StoredChunk(where, data, "", position, 0, start_time, end_time, count, first.start)
+        return chunk, first.start + position
 
 
 def opcode_name(opcode: int) -> str:
@@ -255,7 +297,3 @@ class _ExactStream(ReadDataStream):
         if len(data) != length:
             raise EndOfFile
         return data
-
-
-def _cut(limit: int, size: int) -> str:
-    return "the file ends in it" if limit == size else "it reaches into the summary"

@@ -87,7 +87,7 @@ class SqliteReader:
         except BagError:
             if not self._salvage:
                 raise
-            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(*self._selecting(EVERYTHING))]
+            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(EVERYTHING)]
         counts = dict.fromkeys(self.topics, 0)
         for topic, count, _, _ in groups:
             if topic not in self._topic_ids:
@@ -100,15 +100,17 @@ class SqliteReader:
         """Yield nothing: a database has no room for them."""
         return iter(())
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        """Yield the messages of a selection, in the order of the table, as chunks of about `CHUNK_SIZE` bytes.
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        """Yield the messages of a selection as chunks of about `CHUNK_SIZE` bytes; see `StorageReader.chunks`.
 
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
         rows: list[tuple[Any, ...]] = []
         size = done = 0
-        for row in self._messages(*self._selecting(selection)):
+        for row in self._messages(selection, in_time_order):
             rows.append(row)
             size += _ROW_SIZE + (len(row[3]) if isinstance(row[3], bytes) else 0)
             if size >= CHUNK_SIZE:
@@ -232,29 +234,30 @@ class SqliteReader:
         """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
         return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
 
-    def _selecting(self, selection: Selection) -> tuple[str, list[int]]:
+    def _selecting(self, selection: Selection, in_time_order: bool) -> tuple[str, list[int]]:
         """Return the query for the messages of a selection, and its values after the first, which is a row to begin at.
 
-        The plus keeps sqlite from sorting whole messages by the index of times.
+        A plus keeps sqlite from sorting whole messages by the index of times.
         """
+        time = "timestamp" if in_time_order else "+timestamp"
         conditions = ["id >= ?"]
         values: list[int] = []
         if selection.topic_ids is not None:
             rows = [str(row) for row, topic_id in self._topic_ids.items() if topic_id in selection.topic_ids]
             conditions.append(f"topic_id IN ({', '.join(rows)})")
         if selection.start_time:
-            conditions.append("+timestamp >= ?")
+            conditions.append(f"{time} >= ?")
             values.append(min(selection.start_time, _LAST_ROW))
         if selection.end_time is not None:
-            conditions.append("+timestamp < ?")
+            conditions.append(f"{time} < ?")
             values.append(min(selection.end_time, _LAST_ROW))
-        query = (
-            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id"
-        )
-        return query, values
+        order = "timestamp, id" if in_time_order else "id"
+        where = " AND ".join(conditions)
+        return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
-    def _messages(self, query: str, values: list[int]) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of a query of `_selecting`, without damaged ones if the file is to be salvaged."""
+    def _messages(self, selection: Selection, in_time_order: bool = False) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a selection; in the order of the table, damaged ones are left out to salvage a file."""
+        query, values = self._selecting(selection, in_time_order)
         first = _FIRST_ROW
         done = 0
         while True:
@@ -266,7 +269,7 @@ class SqliteReader:
                 return
             except _ERRORS as error:
                 first = row[0] + 1 if row else first
-                if not self._salvage:
+                if not self._salvage or in_time_order:
                     where = f"{self.path}: table messages, from row {first} on"
                     raise BagError(
                         f"{where}: {_reason(error)}; {done} messages before it were read"

@@ -10,8 +10,9 @@ import difflib
 import re
 from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import cast
 
 from rosidl_adapter_proto.errors import DefinitionError
@@ -33,8 +34,18 @@ class Catalog:
 
     @cached_property
     def packages(self) -> Mapping[str, Package]:
-        """Every package, from the first source that has it; later ones are not even asked."""
-        return ChainMap(*(cast("dict[str, Package]", source.packages) for source in self.sources))
+        """Every package, from the first source that has it; later ones are not even asked.
+
+        Sources that have single types win before all others.
+        """
+        partial = [each.packages for each in self.sources if each.is_partial]
+        whole = [cast("dict[str, Package]", each.packages) for each in self.sources if not each.is_partial]
+        completed: dict[str, dict[TypeName, Definition]] = {}
+        for name in dict.fromkeys(chain.from_iterable(partial)):
+            for packages in (*partial, ChainMap(*whole)):
+                for type_name, definition in packages.get(name, {}).items():
+                    completed.setdefault(name, {}).setdefault(type_name, definition)
+        return ChainMap(cast("dict[str, Package]", completed), *whole)
 
     def package(self, name: str) -> Package:
         """Return the definitions of a package.
@@ -70,7 +81,7 @@ class Catalog:
         package = self.packages.get(name.package, {})
         if name in package:
             return name
-        base = TypeName(name.package, name.namespace, _DERIVED.sub("", name.name))
+        base = interface_base(name)
         if base == name or base not in package:
             return None
         return base if name in {each.name for each in structs(package[base].interface)} else None
@@ -149,6 +160,11 @@ class Catalog:
         """Say where was looked."""
         places = (f"{each.origin} ({each.limit})" if each.limit else each.origin for each in self.sources)
         return "looked in " + ", ".join(places)
+
+
+def interface_base(name: TypeName) -> TypeName:
+    """Return the service or action that a name belongs to if it is one of a part; any other name as it is."""
+    return name if name.namespace == "msg" else replace(name, name=_DERIVED.sub("", name.name))
 
 
 def _is_same(one: Definition, other: Definition) -> bool:

@@ -15,16 +15,16 @@ from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces import store
 from rosidl_adapter_proto.interfaces.idl import parse_idl
 from rosidl_adapter_proto.interfaces.model import NAMESPACES, Interface, TypeName
-from rosidl_adapter_proto.interfaces.msg import parse_action, parse_msg, parse_srv
+from rosidl_adapter_proto.interfaces.msg import ROS1, ROS2, Dialect, parse_action, parse_msg, parse_srv
 
 SUFFIXES = (".idl", ".action", ".srv", ".msg")
 """File name suffixes of definitions."""
 
-_PARSERS: dict[str, Callable[[str, TypeName, str], Interface]] = {
+_PARSERS: dict[str, Callable[[str, TypeName, str, Dialect], Interface]] = {
     ".msg": parse_msg,
     ".srv": parse_srv,
     ".action": parse_action,
-    ".idl": parse_idl,
+    ".idl": lambda text, name, file, _: parse_idl(text, name, file),
 }
 
 _IGNORE_MARKERS = {"COLCON_IGNORE", "AMENT_IGNORE"}
@@ -56,7 +56,7 @@ class Definition:
         file: Its path, or the place in the embedded store.
         origin: The source that has it, for people.
         stored_text: The definition itself, if it is in no file.
-        ros1_names: Whether it is written for ROS 1.
+        dialect: The rules of a text that is not `.idl`.
         other_file: Another file that defines the same type, if there is one: then neither can be read.
     """
 
@@ -65,7 +65,7 @@ class Definition:
     file: str
     origin: str
     stored_text: str | None = None
-    ros1_names: bool = False
+    dialect: Dialect = ROS2
     other_file: str | None = None
 
     @cached_property
@@ -102,9 +102,7 @@ class Definition:
         Raises:
             DefinitionError: It cannot be read or is not valid.
         """
-        if self.ros1_names:
-            return parse_msg(self.text, self.name, self.file, ros1_names=True)
-        return _PARSERS[self.format](self.text, self.name, self.file)
+        return _PARSERS[self.format](self.text, self.name, self.file, self.dialect)
 
 
 Package = Mapping[TypeName, Definition]
@@ -119,12 +117,14 @@ class Source:
         packages: The definitions of each package.
         stands_in: Whether it only stands in for packages that are nowhere else.
         limit: What it can have at all, for people; empty if that is everything.
+        is_partial: Whether it has single types: of their packages, other sources have the rest.
     """
 
     origin: str
     packages: Mapping[str, Package]
     stands_in: bool = False
     limit: str = ""
+    is_partial: bool = False
 
 
 def folder_source(folder: Path) -> Source:
@@ -211,7 +211,7 @@ def text_source(texts: Mapping[TypeName, str]) -> Source:
             raise DefinitionError(f"{name}: what stands in the middle has to be msg, srv or action")
         definition = Definition(name, f".{name.namespace}", str(name), _GIVEN_TEXTS, stored_text=text)
         packages.setdefault(name.package, {})[name] = definition
-    return Source(_GIVEN_TEXTS, packages)
+    return Source(_GIVEN_TEXTS, packages, is_partial=True)
 
 
 _GIVEN_TEXTS = "the given texts"
@@ -289,7 +289,7 @@ class _StorePackages(Mapping[str, Package]):
 
 
 def _store_packages(distribution: str, origin: str) -> Mapping[str, Package]:
-    ros1_names = store.has_ros1_names(distribution)
+    dialect = ROS1 if store.is_ros1(distribution) else ROS2
     packages: dict[str, dict[TypeName, Definition]] = {}
     texts = store.definitions(distribution)
     # ROS adds these to services and actions; old distributions do not have them all.
@@ -297,7 +297,7 @@ def _store_packages(distribution: str, origin: str) -> Mapping[str, Package]:
         if name.package in _USED_BY_ROS_ITSELF:
             texts.setdefault(name, text)
     for name, text in texts.items():
-        definition = Definition(name, ".msg", f"{origin}: {name}", origin, text, ros1_names)
+        definition = Definition(name, ".msg", f"{origin}: {name}", origin, text, dialect)
         packages.setdefault(name.package, {})[name] = definition
     return packages
 

@@ -10,7 +10,7 @@ import re
 import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from rosidl_adapter_proto.errors import DefinitionError
@@ -62,7 +62,8 @@ _NAMES_ELSEWHERE = {
     "str": "string",
     "uint": "uint32 or uint64",
 }
-_ROS1_FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_LOOSE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_STRING_CONSTANT = re.compile(r"\s*string\s[^#=]*=")
 
 _DERIVED_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
 
@@ -72,48 +73,92 @@ _UP_TO_BRACKET_OR_COMMA = re.compile(r"([^,\]]*)([,\]]?)")
 _IDL_STRING = re.compile(r"""([^"\\\n\r]|\\[^\n\r])*""")
 _IDL_ESCAPE = re.compile(r"""\\(?:([ntvbrfa\\'"])|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))""")
 _IDL_ESCAPED_AGAIN = re.compile(r'\\(["\\])')
-_SEPARATOR = "---"
+SEPARATOR = "---"
+"""The line between the parts of a service or an action."""
 _LONGEST_QUOTATION = 60
 
 
-def parse_msg(text: str, name: TypeName, file: str, *, ros1_names: bool = False) -> Message:
+@dataclass(frozen=True)
+class Dialect:
+    """The rules by which a `.msg`, `.srv` or `.action` text is read.
+
+    Attributes:
+        name: What it is called.
+        is_loose: Whether names, indentation, comments and `package/msg/Name` are allowed that ROS 2 refuses.
+        types: What names of types mean besides those of ROS 2, or instead of them.
+        has_whole_line_strings: Whether a string constant goes up to the end of its line, quotes and `#` included.
+    """
+
+    name: str
+    is_loose: bool = False
+    types: Mapping[str, ValueType] = field(default_factory=dict, compare=False, repr=False)
+    has_whole_line_strings: bool = False
+
+
+HEADER = TypeName("std_msgs", "msg", "Header")
+_TIMES: Mapping[str, ValueType] = {
+    "time": TypeName("builtin_interfaces", "msg", "Time"),
+    "duration": TypeName("builtin_interfaces", "msg", "Duration"),
+}
+
+ROS2 = Dialect("ros2")
+"""What `rosidl_adapter` accepts."""
+
+RECORDED = Dialect("recorded", is_loose=True, types=_TIMES)
+"""What is in recordings: of ROS 2, but also by hand and by tools, which know ROS 1 as well."""
+
+RECORDED_WITH_HEADER = Dialect("recorded with Header", is_loose=True, types={**_TIMES, "Header": HEADER})
+"""The same, where `Header` without a package can only be that of `std_msgs`."""
+
+ROS1 = Dialect(
+    "ros1",
+    is_loose=True,
+    types={**_TIMES, "Header": HEADER, "byte": BasicType("int8"), "char": BasicType("uint8")},
+    has_whole_line_strings=True,
+)
+"""ROS 1 (https://wiki.ros.org/msg)."""
+
+
+def parse_msg(text: str, name: TypeName, file: str, dialect: Dialect = ROS2) -> Message:
     """Read a `.msg` definition.
 
     Args:
         text: The definition.
         name: The type that it defines.
         file: Where it came from, for messages.
-        ros1_names: Whether field names may contain upper case letters, as ROS 1 allows.
+        dialect: The rules of the text.
 
     Raises:
-        DefinitionError: ROS 2 would not accept the definition; the message gives file, line and column.
+        DefinitionError: ROS would not accept the definition; the message gives file, line and column.
     """
-    return _MessageReader(text, name, file, ros1_names).read(0, len(text.splitlines()), text)
+    return _MessageReader(text, name, file, dialect).read(0, len(text.splitlines()), text)
 
 
-def parse_srv(text: str, name: TypeName, file: str) -> Service:
+def parse_srv(text: str, name: TypeName, file: str, dialect: Dialect = ROS2) -> Service:
     """Read a `.srv` definition; arguments and errors are those of `parse_msg`."""
-    request, response = _parse_sections(text, name, file, ("_Request", "_Response"))
+    request, response = _parse_sections(text, name, file, dialect, ("_Request", "_Response"))
     return Service(name, request, response, text, (*request.warnings, *response.warnings))
 
 
-def parse_action(text: str, name: TypeName, file: str) -> Action:
+def parse_action(text: str, name: TypeName, file: str, dialect: Dialect = ROS2) -> Action:
     """Read an `.action` definition; arguments and errors are those of `parse_msg`."""
-    goal, result, feedback = _parse_sections(text, name, file, ("_Goal", "_Result", "_Feedback"))
+    goal, result, feedback = _parse_sections(text, name, file, dialect, ("_Goal", "_Result", "_Feedback"))
     warnings = (*goal.warnings, *result.warnings, *feedback.warnings)
     return Action(name, goal, result, feedback, text, warnings)
 
 
-def _parse_sections(text: str, name: TypeName, file: str, suffixes: tuple[str, ...]) -> list[Message]:
+def _parse_sections(
+    text: str, name: TypeName, file: str, dialect: Dialect, suffixes: tuple[str, ...]
+) -> list[Message]:
     lines = text.splitlines()
-    separators = [index for index, line in enumerate(lines) if line == _SEPARATOR]
+    separators = [index for index, line in enumerate(lines) if line == SEPARATOR]
     expected = len(suffixes) - 1
     if len(separators) != expected:
         raise _separator_problem(lines, separators, file, [suffix[1:].lower() for suffix in suffixes])
     starts = [0, *(index + 1 for index in separators)]
     ends = [*separators, len(lines)]
     return [
-        _MessageReader(text, name.sibling(suffix), file).read(start, end)
+        _MessageReader(text, name.sibling(suffix), file, dialect).read(start, end)
         for suffix, start, end in zip(suffixes, starts, ends, strict=True)
     ]
 
@@ -122,7 +167,7 @@ def _separator_problem(
     lines: list[str], separators: list[int], file: str, parts: list[str]
 ) -> DefinitionError:
     expected = len(parts) - 1
-    like_separators = [index for index, line in enumerate(lines) if line.strip() == _SEPARATOR != line]
+    like_separators = [index for index, line in enumerate(lines) if line.strip() == SEPARATOR != line]
     if len(separators) > expected:
         line = separators[expected]
     elif like_separators:
@@ -131,7 +176,7 @@ def _separator_problem(
         line = max(len(lines) - 1, 0)
     hint = "; such a line has nothing else on it, spaces included" if like_separators else ""
     message = (
-        f"expected {expected} line{'s' * (expected > 1)} '{_SEPARATOR}', between "
+        f"expected {expected} line{'s' * (expected > 1)} '{SEPARATOR}', between "
         f"{', '.join(parts[:-1])} and {parts[-1]}, found {len(separators)}{hint}"
     )
     return problem(message, "\n".join(lines), Location(file, line + 1))
@@ -147,18 +192,18 @@ class _CommentLine(NamedTuple):
 class _MessageReader:
     """Reads one message out of some lines of a definition."""
 
-    def __init__(self, text: str, name: TypeName, file: str, ros1_names: bool = False) -> None:
+    def __init__(self, text: str, name: TypeName, file: str, dialect: Dialect) -> None:
         self.text = text
         self.name = name
         self.file = file
         self.lines = text.splitlines()
-        self.ros1_names = ros1_names
+        self.dialect = dialect
         self.warnings: list[str] = []
 
     def read(self, start: int, end: int, text: str = "") -> Message:
         """Read the lines from `start` up to `end`, counted from 0."""
         for kind, part in (("package", self.name.package), ("message", _without_suffix(self.name.name))):
-            if not _NAME_RULES[kind].fullmatch(part):
+            if not self._name_rule(kind).fullmatch(part):
                 raise DefinitionError(
                     f"{self.file}: {part!r} is not a valid {kind} name; {_NAME_ADVICE[kind]}"
                 )
@@ -172,7 +217,7 @@ class _MessageReader:
         comments: list[list[_CommentLine]] = []  # of each element, in order of appearance
         elements: list[Field | Constant] = []
         for number, line in enumerate(self.lines[start:end], start + 1):
-            code, mark, comment = line.replace("\t", " ").rstrip().partition("#")
+            code, mark, comment = self._without_comment(line)
             if mark and code and not code.strip():
                 # An indented comment goes on with that of the element above; before the first, the message has it.
                 indented = _CommentLine(comment.lstrip("#"), number)
@@ -205,6 +250,13 @@ class _MessageReader:
             tuple(self.warnings),
         )
 
+    def _without_comment(self, line: str) -> tuple[str, str, str]:
+        """Return what stands before a comment, its mark, and what stands behind it."""
+        if self.dialect.has_whole_line_strings and _STRING_CONSTANT.match(line):
+            name, mark, value = line.partition("=")
+            return name.replace("\t", " ") + mark + value.rstrip(), "", ""
+        return line.replace("\t", " ").rstrip().partition("#")
+
     def _documented(self, element: Field | Constant, lines: list[_CommentLine]) -> Field | Constant:
         """Return a field or constant with its comment and unit."""
         texts, unit = _without_unit(lines)
@@ -222,7 +274,7 @@ class _MessageReader:
 
     def _check_escapes(self, text: str, line: int) -> None:
         """Refuse a line of a comment, or a unit, that is broken on the way to .idl, where it is a string."""
-        if self.ros1_names:
+        if self.dialect.is_loose:
             return
         try:
             _through_idl(text)
@@ -237,7 +289,7 @@ class _MessageReader:
     def _element(self, code: str, number: int) -> Field | Constant:
         """Read a field or constant from a line without its comment."""
         type_column = len(code) - len(code.lstrip()) + 1
-        if type_column > 1 and not self.ros1_names:
+        if type_column > 1 and not self.dialect.is_loose:
             raise self._problem(
                 "ROS 2 does not accept an indented field or constant; begin it in the first column",
                 Location(self.file, number, type_column),
@@ -251,7 +303,7 @@ class _MessageReader:
         if "=" in rest:
             return self._constant(type_text, rest, type_location, name_location)
         name, _, default_text = rest.partition(" ")
-        if not (_ROS1_FIELD_NAME if self.ros1_names else _NAME_RULES["field"]).fullmatch(name):
+        if not self._name_rule("field").fullmatch(name):
             raise self._bad_name("field", name, name_location)
         field_type = self._type(type_text, type_location)
         default_text = default_text.strip()
@@ -272,7 +324,7 @@ class _MessageReader:
                 "the default value of a field is written without '=' and cannot contain one",
                 location,
             )
-        if not _NAME_RULES["constant"].fullmatch(name):
+        if not self._name_rule("constant").fullmatch(name):
             raise self._bad_name("constant", name, location)
         constant_type = self._type(type_text, type_location)
         if not isinstance(constant_type, (BasicType, StringType)) or "<=" in type_text:
@@ -281,6 +333,8 @@ class _MessageReader:
                 type_location,
             )
         value_text = value_text.strip()
+        if self.dialect.has_whole_line_strings and isinstance(constant_type, StringType):
+            return Constant(name, constant_type, value_text, location=location)
         column = location.column + len(rest) - len(rest.partition("=")[2].lstrip())
         value = self._scalar(constant_type, value_text, Location(self.file, location.line, column))
         return Constant(name, constant_type, value, location=location)
@@ -309,6 +363,8 @@ class _MessageReader:
         return element.bound
 
     def _value_type(self, text: str, location: Location) -> ValueType:
+        if text in self.dialect.types:
+            return self.dialect.types[text]
         base, is_bounded, bound_text = text.partition("<=")
         if base in _PRIMITIVE_TYPES:
             primitive = _PRIMITIVE_TYPES[base]
@@ -322,16 +378,18 @@ class _MessageReader:
         if text in _NAMES_ELSEWHERE:
             raise self._problem(f"{text!r} is not a type in .msg; use {_NAMES_ELSEWHERE[text]}", location)
         package, slash, message = text.rpartition("/")
+        if package.endswith("/msg") and self.dialect.is_loose:
+            package = package.removesuffix("/msg")
         if package.endswith("/msg"):
             short = f"{package.removesuffix('/msg')}/{message}"
             raise self._problem(f"{text!r} is not written with '/msg/' in .msg; use {short}", location)
         package = package if slash else self.name.package
-        if not _NAME_RULES["package"].fullmatch(package):
+        if not self._name_rule("package").fullmatch(package):
             raise self._problem(
                 f"{text!r} is not a type: {package!r} is not a valid package name; {_NAME_ADVICE['package']}",
                 location,
             )
-        if not _NAME_RULES["message"].fullmatch(_without_suffix(message)):
+        if not self._name_rule("message").fullmatch(_without_suffix(message)):
             raise self._problem(
                 f"{text!r} is neither a primitive type nor the name of a message; "
                 f"{_NAME_ADVICE['message']}",
@@ -399,6 +457,9 @@ class _MessageReader:
                     f"{element.name!r} is defined twice, first in line {first.line}", element.location
                 )
             seen[element.name] = element.location
+
+    def _name_rule(self, kind: str) -> re.Pattern[str]:
+        return _LOOSE_NAME if self.dialect.is_loose else _NAME_RULES[kind]
 
     def _bad_name(self, kind: str, name: str, location: Location) -> DefinitionError:
         return self._problem(f"{_quoted(name)} is not a valid {kind} name; {_NAME_ADVICE[kind]}", location)

@@ -52,8 +52,8 @@ def definitions(distribution: str) -> dict[TypeName, str]:
     return {TypeName.parse(name): _msg_text(constants, fields) for name, (constants, fields) in types.items()}
 
 
-def has_ros1_names(distribution: str) -> bool:
-    """Tell whether field names of a distribution follow the looser rules of ROS 1."""
+def is_ros1(distribution: str) -> bool:
+    """Tell whether a distribution is one of ROS 1, whose definitions have other rules."""
     return distribution == _ROS1
 
 

@@ -119,10 +119,35 @@ def message_class(descriptor: Descriptor, interface: TypeName, python_root: str)
         interface: The interface that it is part of.
         python_root: The namespace package of generated code.
     """
-    module = f"{generated_module(interface, python_root)}_pb2"
+    return _made(descriptor, f"{generated_module(interface, python_root)}_pb2")
+
+
+def kept_class(descriptor: Descriptor) -> MessageClass:
+    """Return the class of a message that is not one of ours, and make those of all messages in its files.
+
+    Args:
+        descriptor: A message in any pool.
+    """
+    with lock:
+        waiting, files = [descriptor.file], {descriptor.file.name: descriptor.file}
+        while waiting:
+            for each in waiting.pop().dependencies:
+                if each.name not in files:
+                    files[each.name] = each
+                    waiting.append(each)
+        messages = [each for file in files.values() for each in file.message_types_by_name.values()]
+        while messages:
+            message = messages.pop()
+            _kept_classes.add(_made(message, message.file.package))
+            messages.extend(message.nested_types)
+        return _made(descriptor, descriptor.file.package)
+
+
+def _made(descriptor: Descriptor, module: str) -> MessageClass:
     metaclass: Any = reflection.GeneratedProtocolMessageType
-    contents = {"DESCRIPTOR": descriptor, "__module__": module}
-    made: MessageClass = metaclass(descriptor.name, (Message,), contents)
+    made: MessageClass = metaclass(
+        descriptor.name, (Message,), {"DESCRIPTOR": descriptor, "__module__": module}
+    )
     return made
 
 

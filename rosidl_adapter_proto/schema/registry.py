@@ -22,7 +22,6 @@ from rosidl_adapter_proto.interfaces.closure import type_closure
 from rosidl_adapter_proto.interfaces.description import TypeDescription, type_hash
 from rosidl_adapter_proto.interfaces.find import (
     Definition,
-    Source,
     folder_source,
     installed_sources,
     prefixes,
@@ -237,15 +236,13 @@ class TypeRegistry:
         for name, text in texts.items():
             if not isinstance(text, str):
                 raise TypeError(f"the definition of {name!r} must be a text, not {type(text).__name__}")
-        installed = Catalog(tuple(installed_sources()))
         given = text_source({_parsed(name): text for name, text in texts.items()})
-        # Of a package, the texts may have some types only.
-        packages = {
-            name: {**package, **installed.packages.get(name, {}), **package}
-            for name, package in given.packages.items()
-        }
-        sources = (Source(given.origin, packages), *installed.sources)
-        return cls(Catalog(sources), lock_file=lock_file, events=events, python_root=python_root)
+        return cls(
+            Catalog((given, *installed_sources())),
+            lock_file=lock_file,
+            events=events,
+            python_root=python_root,
+        )
 
     def __contains__(self, name: object) -> bool:
         """Tell whether there is a definition of a type; it may still turn out not to be valid."""
@@ -273,6 +270,19 @@ class TypeRegistry:
             if type_name not in self._schemas:
                 self._schemas[type_name] = self._schema(type_name)
             return self._schemas[type_name]
+
+    def definitions(self, name: str | TypeName) -> Mapping[TypeName, Definition]:
+        """Return the definitions that a type is made of: its own, and those of all that it refers to.
+
+        Args:
+            name: The type; a part of a service or an action has the definition of the whole.
+
+        Raises:
+            DefinitionError: As for the schema of the type.
+        """
+        type_name = name if isinstance(name, TypeName) else _parsed(name, self._catalog)
+        names = type_closure(self._catalog, type_name, events=self._events)
+        return {each: self._catalog.definition(each) for each in reversed(names)}
 
     def _schema(self, name: TypeName) -> Schema:
         owner = self._catalog.definition_name(name)
@@ -342,7 +352,7 @@ class TypeRegistry:
 
     def _own_pool(self) -> DescriptorPool:
         """Return the pool of registries that are given the same."""
-        given = sorted((str(each.name), each.format, each.ros1_names, _text(each)) for each in self._given)
+        given = sorted((str(each.name), each.format, each.dialect.name, _text(each)) for each in self._given)
         origins = tuple(each.origin for each in self._catalog.sources)
         return pools.own_pool((tuple(given), origins, self._events, self._lock_text, self._python_root))
 

@@ -81,6 +81,9 @@ class Transcoder:
     def proto_to_cdr(self, data: Buffer, /) -> bytes:
         """Turn a serialized protobuf message into a serialized ROS message."""
 
+    def ros1_to_proto(self, data: Buffer, /) -> bytes:
+        """Turn a message serialized by ROS 1 into a serialized protobuf message."""
+
     def _cdr_to_proto_batch(
         self, messages: Iterable[Buffer] | Buffer, ranges: Buffer | None, threads: int, into: Buffer | None, /
     ) -> tuple[Buffer, int, bytes, dict[int, TranscodeError]]:

@@ -63,23 +63,26 @@ def _chunk(data: bytes, compression: str = "none", size: int | None = None) -> b
 CONNECTIONS = [_connection(0, "/a"), _connection(1, "/b"), _connection(2, "/a", callerid=b"/node")]
 
 
-def bag(compression: str = "none", *, index: bool = True, head: bytes = b"") -> bytes:
-    """Return a bag with `ROWS` in three chunks, whose topic `/a` has the connections 0 and 2.
+def bag(
+    compression: str = "none", *, index: bool = True, head: bytes = b"", rows: tuple[Row, ...] = ROWS
+) -> bytes:
+    """Return a bag with rows in chunks of four, whose topic `/a` has the connections 0 and 2.
 
     Args:
         compression: That of its chunks.
         index: Whether it has one.
         head: More fields of its header.
+        rows: The messages; the times of four rise.
     """
-    numbers = [1 if row.topic == "/b" else i % 2 * 2 for i, row in enumerate(ROWS)]
+    numbers = [1 if row.topic == "/b" else i % 2 * 2 for i, row in enumerate(rows)]
     content = b""
     infos = b""
     begin = len(b"#ROSBAG V2.0\n") + 4096
-    for first in (0, 4, 8):
-        rows = list(zip(numbers, ROWS, strict=True))[first : first + 4]
-        data = b"".join(CONNECTIONS) + b"".join(_message(number, row) for number, row in rows)
-        counts = b"".join(_u32(n) + _u32([m for m, _ in rows].count(n)) for n in sorted({m for m, _ in rows}))
-        times = {"start_time": _time(rows[0][1].time), "end_time": _time(rows[-1][1].time)}
+    for first in range(0, len(rows), 4):
+        part = list(zip(numbers, rows, strict=True))[first : first + 4]
+        data = b"".join(CONNECTIONS) + b"".join(_message(number, row) for number, row in part)
+        counts = b"".join(_u32(n) + _u32([m for m, _ in part].count(n)) for n in sorted({m for m, _ in part}))
+        times = {"start_time": _time(part[0][1].time), "end_time": _time(part[-1][1].time)}
         place = struct.pack("<Q", begin + len(content))
         infos += _record(6, counts, ver=_u32(1), chunk_pos=place, count=_u32(len(counts) // 8), **times)
         content += _chunk(data, compression) + _record(4, bytes(12), ver=_u32(1), conn=_u32(0), count=_u32(1))
@@ -154,6 +157,20 @@ def test_chunks_of_other_times_are_not_read() -> None:
         for selection, first in ((Selection(start_time=2 * 10**9), 8), (Selection(end_time=10**9), 0)):
             assert rows_of(reader, selection) == list(ROWS[first : first + 4])
             assert [chunk.message_count for chunk in reader.chunks(selection)] == [4]
+
+
+@pytest.mark.parametrize("index", [True, False])
+def test_chunks_come_in_the_order_of_time(index: bool) -> None:
+    loose = () if index else (Row("/a", 10**9 + 7, b"loose"), Row("/b", 7 * 10**9, b"late"))
+    content = bag(index=index, rows=ROWS[8:] + ROWS[:8]) + b"".join(
+        _message("ab".index(row.topic[1]), row) for row in loose
+    )
+    with Ros1Reader(BytesIO(content), "a.bag") as reader:
+        assert rows_of(reader) == [*ROWS[8:], *ROWS[:8], *loose]
+        assert rows_of(reader, in_time_order=True) == [*ROWS[:8], *loose, *ROWS[8:]]
+        assert rows_of(reader, Selection(end_time=10**9), in_time_order=True) == list(ROWS[:4])
+        positions = [chunk.position for chunk in reader.chunks()]
+        assert positions == sorted(positions)
 
 
 UNFINISHED = "a.bag: without an index, as its recorder did not finish; read from its beginning"

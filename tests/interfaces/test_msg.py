@@ -27,7 +27,7 @@ from rosidl_adapter_proto.interfaces.model import (
     StringType,
     TypeName,
 )
-from rosidl_adapter_proto.interfaces.msg import parse_action, parse_msg, parse_srv
+from rosidl_adapter_proto.interfaces.msg import ROS1, parse_action, parse_msg, parse_srv
 from tests import oracle
 from tests.pipeline import facts, official, parts
 
@@ -396,7 +396,7 @@ def test_comments_that_ros_does_not_look_into(text: str, tmp_path: Path) -> None
 
 
 def test_ros1_definitions_have_backslashes_in_their_comments() -> None:
-    message = parse_msg(r"int8 x # C:\new", FOO, "Foo.msg", ros1_names=True)
+    message = parse_msg(r"int8 x # C:\new", FOO, "Foo.msg", ROS1)
     assert message.fields[0].comment == (r"C:\new",)
 
 
@@ -497,7 +497,7 @@ def test_locations() -> None:
 
 
 def test_ros1_definitions_are_less_strict() -> None:
-    message = parse_msg("  float64[9] K\n\tstring childFrame", FOO, "Foo.msg", ros1_names=True)
+    message = parse_msg("  float64[9] K\n\tstring childFrame", FOO, "Foo.msg", ROS1)
     assert message.fields == (Field("K", ArrayType(DOUBLE, 9)), Field("childFrame", STRING))
 
 

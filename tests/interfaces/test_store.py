@@ -40,7 +40,7 @@ def test_distributions() -> None:
     found = store.distributions()
     assert found[: len(DISTRIBUTIONS)] == DISTRIBUTIONS
     assert store.newest_distribution() == found[-1]
-    assert [each for each in found if store.has_ros1_names(each)] == ["noetic"]
+    assert [each for each in found if store.is_ros1(each)] == ["noetic"]
 
 
 @pytest.mark.parametrize("distribution", store.distributions())

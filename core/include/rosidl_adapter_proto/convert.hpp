@@ -5,7 +5,7 @@
 
 namespace rosidl_proto {
 
-enum class Treatment : uint8_t { NoRoute, LeaveOut, Copy, CdrToProto, ProtoToCdr };
+enum class Treatment : uint8_t { NoRoute, LeaveOut, Copy, CdrToProto, ProtoToCdr, Ros1ToProto };
 
 // What becomes of the messages of one topic.
 struct Route {

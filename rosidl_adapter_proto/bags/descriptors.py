@@ -1,0 +1,103 @@
+"""The descriptors of protobuf messages in recordings: serialized `FileDescriptorSet`s.
+
+A recording has a file with all that it imports (https://mcap.dev/spec/registry#protobuf). Messages of one recording may
+have other fields or numbers than those of another, or than generated code: each set has a descriptor pool of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+from google.protobuf.descriptor import Descriptor, FileDescriptor
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message import DecodeError
+
+from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.schema.pools import MessageClass, kept_class
+
+MAXIMUM_SIZE = 16 * 2**20
+"""The largest descriptor set that is read, in bytes."""
+
+
+def descriptor_set(descriptor: Descriptor) -> bytes:
+    """Return the file of a message and all that it imports, what is imported first, as a serialized set."""
+    files: dict[str, FileDescriptorProto] = {}
+    waiting: list[FileDescriptor] = [descriptor.file]
+    while waiting:
+        file = waiting.pop()
+        if file.name not in files:
+            files[file.name] = FileDescriptorProto.FromString(file.serialized_pb)
+            waiting.extend(file.dependencies)
+    return FileDescriptorSet(file=_in_order(files)).SerializeToString(deterministic=True)
+
+
+def recorded_class(data: bytes, full_name: str) -> MessageClass:
+    """Return the class of the messages that a recording describes; the same set gives the same class.
+
+    Args:
+        data: The serialized set.
+        full_name: The full name of the message.
+
+    Raises:
+        BagError: The set is damaged or not complete, or does not have the message.
+    """
+    try:
+        descriptor = _pool(data).FindMessageTypeByName(full_name)
+    except KeyError:
+        raise BagError(f"its protobuf descriptor has no message {full_name!r}") from None
+    return kept_class(descriptor)
+
+
+@lru_cache(maxsize=256)
+def _pool(data: bytes) -> DescriptorPool:
+    """Return a pool that has the files of a set."""
+    if len(data) > MAXIMUM_SIZE:
+        raise BagError(f"its protobuf descriptor has more than {MAXIMUM_SIZE} bytes")
+    try:
+        files = FileDescriptorSet.FromString(data).file
+    except DecodeError as error:
+        raise BagError(f"its protobuf descriptor is damaged: {error}") from None
+    by_name = {each.name: each for each in files}
+    if len(by_name) != len(files):
+        raise BagError("its protobuf descriptor has two files of the same name")
+    pool = DescriptorPool()
+    for file in _in_order(by_name):
+        try:
+            pool.AddSerializedFile(file.SerializeToString())
+        except (TypeError, ValueError) as error:
+            raise BagError(
+                f"protobuf does not take the file {file.name!r} of its descriptor: {error}"
+            ) from None
+    return pool
+
+
+def _in_order(files: dict[str, FileDescriptorProto]) -> Iterator[FileDescriptorProto]:
+    """Yield files behind those that they import, without recursion, since a chain may be long.
+
+    Raises:
+        BagError: One that is imported is missing, or files import each other.
+    """
+    done: set[str] = set()
+    for first in files:
+        path: dict[str, Iterator[str]] = {}
+        waiting = [] if first in done else [first]
+        while waiting:
+            name = waiting.pop()
+            path[name] = iter(files[name].dependency)
+            while path and not waiting:
+                current = next(reversed(path))
+                needed = next((each for each in path[current] if each not in done), None)
+                if needed is None:
+                    del path[current]
+                    done.add(current)
+                    yield files[current]
+                elif needed in path:
+                    raise BagError(f"files of its protobuf descriptor import each other: {', '.join(path)}")
+                elif needed not in files:
+                    raise BagError(
+                        f"its protobuf descriptor has no file {needed!r}, which {current!r} imports"
+                    )
+                else:
+                    waiting.append(needed)

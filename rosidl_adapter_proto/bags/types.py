@@ -1,0 +1,289 @@
+"""The types of a recording: what its messages are in ROS and in protobuf, without generated code.
+
+Definitions come from the recording itself. What it does not define comes from where `generate` finds definitions:
+folders that the user names, what is installed, and the embedded store.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Hashable, Iterable
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+from rosidl_adapter_proto.bags.descriptors import descriptor_set, recorded_class
+from rosidl_adapter_proto.bags.model import PROTOBUF, RecordedDefinition, Topic
+from rosidl_adapter_proto.errors import BagError, DefinitionError, SchemaError
+from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.interfaces.catalog import Catalog, interface_base
+from rosidl_adapter_proto.interfaces.find import Definition, Package, Source
+from rosidl_adapter_proto.interfaces.model import TypeName
+from rosidl_adapter_proto.interfaces.recorded import (
+    ENCODINGS,
+    ORIGIN,
+    recorded_definitions,
+    recorded_source,
+    recorded_text,
+    recorded_type_name,
+)
+from rosidl_adapter_proto.schema.pools import MessageClass
+from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
+
+_PROTO_NAME = re.compile(r"(\w+)\.(msg|srv|action)\.pb\.(\w+)")
+_KNOWN_HASH = "RIHS01_"
+_NEVER_CHANGED = {TypeName("builtin_interfaces", "msg", name) for name in ("Time", "Duration")}
+_ADVICE = (
+    "give the folder of its package with --interfaces FOLDER, or the distribution it is from with --distro"
+)
+
+
+class BagTypes:
+    """Gives the schema of each topic of a recording.
+
+    A schema is made when it is first asked for: what is wrong with a topic's type matters to nobody else. Each topic
+    has its own definitions, since those of a merged recording may differ. Where they are the ones that are installed,
+    its protobuf classes are those of generated code (`TypeRegistry`).
+
+    Attributes:
+        warnings: What is odd about the types that were asked for, for people.
+
+    Args:
+        topics: The topics of the recording.
+        include: Folders that have what the recording does not define.
+        distro: The distribution of the embedded store.
+
+    Raises:
+        DefinitionError: A folder has no definitions, or the store does not have the distribution.
+        RequestError: There is no such folder.
+    """
+
+    def __init__(
+        self, topics: Iterable[Topic], include: Iterable[Path] = (), distro: str | None = None
+    ) -> None:
+        self.warnings: list[str] = []
+        self._elsewhere = find_catalog(include, distro)
+        self._schemas: dict[Hashable, Schema] = {}
+        self._topics = tuple(topics)
+
+    def schema(self, topic: Topic) -> Schema:
+        """Return the schema of a topic.
+
+        Of a protobuf topic, `message_class` is that of the recording, whose numbers may be others than those in
+        `message` and `file`.
+
+        Raises:
+            BagError: There is no definition of its type, or only of another version than it was recorded with, or it is
+                not valid; or the messages are protobuf ones without a ROS type, or with a descriptor that is not valid.
+        """
+        key = _key(topic)
+        if key not in self._schemas:
+            self._schemas[key] = self._schema(topic)
+        return self._schemas[key]
+
+    def message_class(self, topic: Topic) -> MessageClass:
+        """Return the protobuf class of the messages of a topic; a protobuf topic needs no ROS type for that.
+
+        Raises:
+            BagError: As for `schema`.
+        """
+        if topic.serialization_format != PROTOBUF:
+            return self.schema(topic).message_class
+        with contextlib.suppress(BagError):
+            return self.schema(topic).message_class
+        try:
+            return _recorded_class(topic)
+        except BagError as error:
+            raise BagError(f"topic {topic.name}: {error}") from None
+
+    def origin(self, topic: Topic) -> str:
+        """Return where the definition of a topic's type comes from, for people; errors are those of `schema`."""
+        return ", ".join(dict.fromkeys(each.origin for each in _definitions_of(self.schema(topic))))
+
+    def ros_definition(self, topic: Topic) -> RecordedDefinition:
+        """Return the ROS definition of a topic's type: that of the recording as it is, if there is one."""
+        recorded = _recorded(topic)
+        return recorded if self._definitions(topic) else ros_definition(self.schema(topic))
+
+    def _schema(self, topic: Topic) -> Schema:
+        try:
+            name = _ros_type(topic)
+            own = self._definitions(topic)
+            schema = self._registry(name, own)[name]
+            self._check_version(topic, schema, own)
+            return _with_recorded_class(schema, topic) if topic.serialization_format == PROTOBUF else schema
+        except (BagError, DefinitionError, SchemaError) as error:
+            raise BagError(f"topic {topic.name}: {error}") from None
+
+    def _check_version(self, topic: Topic, schema: Schema, own: Package) -> None:
+        """Compare a definition with the version that was recorded: with another one, all data would be wrong."""
+        foreign = [each for each in _definitions_of(schema) if each.name not in own]
+        origins = ", ".join(f"{each.name} from {each.origin}" for each in foreign)
+        if not topic.type_hash.startswith(_KNOWN_HASH):
+            if any(each.origin != ORIGIN for each in foreign):
+                self._warn(
+                    f"{schema.type_name}: the recording neither defines all of it nor says which version it has: "
+                    f"{origins}"
+                )
+        elif schema.type_hash != topic.type_hash:
+            difference = f"was recorded with the type hash {topic.type_hash}, but has {schema.type_hash}"
+            if foreign:
+                raise BagError(f"{schema.type_name} {difference} with {origins}: {_ADVICE}")
+            self._warn(f"{schema.type_name} {difference} with the definition in the recording, which is used")
+
+    def _warn(self, text: str) -> None:
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def _definitions(self, topic: Topic) -> Package:
+        """Return the definitions that the recording has for a topic; none if it has none that could be read."""
+        name = _ros_type(topic)
+        definitions = _recorded_definitions(topic, name)
+        if _recorded(topic).data.strip() or self._is_empty_message(topic, name, definitions):
+            return definitions
+        return {}
+
+    def _is_empty_message(self, topic: Topic, name: TypeName, definitions: Package) -> bool:
+        """Tell whether a text without fields is the definition of a message without fields, or only left out."""
+        if topic.type_hash.startswith(_KNOWN_HASH):
+            return Catalog((recorded_source(definitions),)).hash(name) == topic.type_hash
+        return interface_base(name) not in self._elsewhere.packages.get(name.package, {})
+
+    @cached_property
+    def _all_definitions(self) -> Package:
+        """The definitions of all topics, without those that are not valid: that is said where they are asked for."""
+        found: dict[TypeName, Definition] = {}
+        for topic in self._topics:
+            with contextlib.suppress(BagError, DefinitionError):
+                found = {**self._definitions(topic), **found}
+        return found
+
+    def _registry(self, name: TypeName, own: Package) -> TypeRegistry:
+        """Return the registry of a type whose definitions are those, and else those of other topics.
+
+        Raises:
+            BagError: There is none.
+        """
+        base = interface_base(name)
+        definitions = own or (self._all_definitions if base in self._all_definitions else {})
+        catalog = Catalog((recorded_source(definitions), *self._elsewhere.sources))
+        if base not in catalog.packages.get(name.package, {}):
+            raise BagError(
+                f"there is no definition of {name}: it is not in the recording; {self._elsewhere.places()}; {_ADVICE}"
+            )
+        is_event = name.namespace != "msg" and name.name.endswith("_Event")
+        return TypeRegistry(catalog, events=is_event)
+
+
+def protobuf_definition(schema: Schema) -> RecordedDefinition:
+    """Return the descriptor of a message as recordings have it: its file and all that it imports."""
+    return RecordedDefinition("protobuf", descriptor_set(schema.descriptor))
+
+
+def ros_definition(schema: Schema) -> RecordedDefinition:
+    """Return the ROS definition of a type and of all that it refers to, as recordings have it."""
+    return RecordedDefinition(*recorded_text(schema.registry.definitions(schema.type_name)))
+
+
+def recorded_types(topics: Iterable[Topic]) -> tuple[Source, tuple[TypeName, ...]]:
+    """Return the definitions that recordings have for some topics, and every type that these have or need.
+
+    Topics of protobuf messages that are no ROS types are left out.
+
+    Raises:
+        BagError: Two topics have other definitions of the same type, or one has a definition that is none.
+    """
+    known: dict[TypeName, Definition] = {}
+    users: dict[TypeName, Topic] = {}
+    names: dict[TypeName, None] = {}
+    for topic in topics:
+        try:
+            name = _ros_type(topic)
+        except BagError:
+            continue
+        try:
+            definitions = _recorded_definitions(topic, name)
+        except DefinitionError as error:
+            raise BagError(f"topic {topic.name}: {error}") from None
+        names.update(dict.fromkeys(definitions or [interface_base(name)]))
+        for each, definition in definitions.items():
+            if not _is_same(known.setdefault(each, definition), definition):
+                raise BagError(
+                    f"{each} is not the same in topics {users[each].name} and {topic.name}: code can have only one "
+                    "version of it"
+                )
+            users.setdefault(each, topic)
+    return recorded_source(known), tuple(names)
+
+
+def _is_same(one: Definition, other: Definition) -> bool:
+    return (one.text, one.format, one.dialect) == (other.text, other.format, other.dialect)
+
+
+def _key(topic: Topic) -> Hashable:
+    """Return all of a topic that decides its schema."""
+    return (
+        topic.type_name,
+        topic.serialization_format,
+        topic.definition,
+        topic.ros_definition,
+        topic.schema_name,
+        topic.type_hash,
+    )
+
+
+def _recorded(topic: Topic) -> RecordedDefinition:
+    """Return the ROS definition that the recording has for a topic."""
+    return topic.ros_definition if topic.serialization_format == PROTOBUF else topic.definition
+
+
+def _recorded_definitions(topic: Topic, name: TypeName) -> Package:
+    recorded = _recorded(topic)
+    if recorded.encoding not in ENCODINGS:  # unknown, as rosbag2 says where it has found none
+        return {}
+    return recorded_definitions(recorded.data, recorded.encoding, str(name), f"the definition of {name}")
+
+
+def _definitions_of(schema: Schema) -> list[Definition]:
+    """Return the definitions that a type is made of, but those that are the same in every version of ROS."""
+    definitions = schema.registry.definitions(schema.type_name)
+    return [each for name, each in definitions.items() if name not in _NEVER_CHANGED] or [
+        *definitions.values()
+    ]
+
+
+def _ros_type(topic: Topic) -> TypeName:
+    """Return the ROS type of a topic.
+
+    Raises:
+        BagError: It has none.
+    """
+    text = topic.type_name
+    if topic.serialization_format == PROTOBUF and "/" not in text:
+        match = _PROTO_NAME.fullmatch(topic.schema_name)
+        if match is None:
+            raise BagError(
+                f"its messages are protobuf messages {topic.schema_name or text!r}, which have no ROS type: they can "
+                "be read, but not converted"
+            )
+        text = "/".join(match.groups())
+    return recorded_type_name(text)
+
+
+def _recorded_class(topic: Topic) -> MessageClass:
+    """Return the class of the messages of a protobuf topic.
+
+    Raises:
+        BagError: The recording has no descriptor, or one that is not valid.
+    """
+    if topic.definition.encoding != PROTOBUF or not topic.definition.data:
+        raise BagError(f"the recording has no protobuf descriptor of {topic.schema_name or topic.type_name}")
+    return recorded_class(topic.definition.data, topic.schema_name)
+
+
+def _with_recorded_class(schema: Schema, topic: Topic) -> Schema:
+    """Return a schema whose class is that of the recording: the same one, if descriptors are the same."""
+    if protobuf_definition(schema) == topic.definition:
+        return schema
+    return replace(schema, _message_class=_recorded_class(topic))
