@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from mcap import records
 from mcap.opcode import Opcode
@@ -26,6 +26,8 @@ from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, S
 from rosidl_adapter_proto.errors import BagError
 
 _SALVAGE = "`--on-error skip` reads"
+
+_Chunk = TypeVar("_Chunk", ChunkPlace, StoredChunk)
 
 
 class McapReader:
@@ -76,9 +78,21 @@ class McapReader:
             else:
                 yield attachment
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
         """Yield the chunks that may have messages of a selection; see `StorageReader.chunks`."""
-        chunk: StoredChunk | None = None
+        if in_time_order:
+            places = sorted(self._chunks(selection, _without_data), key=lambda place: place.start_time)
+            yield from filter(None, map(self._with_data, places))
+        else:
+            yield from self._chunks(selection, self._with_data)
+
+    def _chunks(
+        self, selection: Selection, found_as: Callable[[ChunkPlace | StoredChunk], _Chunk | None]
+    ) -> Iterator[_Chunk]:
+        """Yield the chunks that may have messages of a selection, in the order of the file."""
+        chunk: _Chunk | None = None
         last: ChunkPlace | StoredChunk | None = None
         chunk_count = 0
         message_counts: list[int | None] = []
@@ -98,7 +112,7 @@ class McapReader:
             chunk_count += isinstance(found, ChunkPlace)
             message_counts.append(found.message_count if isinstance(found, StoredChunk) else None)
             if _in_time(found, selection) and self._has_topics(found, selection):
-                chunk = self._stored_chunk(found)
+                chunk = found_as(found)
         if chunk is not None:
             yield replace(chunk, message_count=message_counts[-1])
         self._check_counts(chunk_count, message_counts)
@@ -201,7 +215,7 @@ class McapReader:
                 )
             )
 
-    def _stored_chunk(self, found: ChunkPlace | StoredChunk) -> StoredChunk | None:
+    def _with_data(self, found: ChunkPlace | StoredChunk) -> StoredChunk | None:
         """Return a chunk with its data; None if it cannot be read, which is noted."""
         if isinstance(found, StoredChunk):
             return found
@@ -222,4 +236,23 @@ class McapReader:
 def _in_time(chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
     return chunk.end_time >= selection.start_time and (
         selection.end_time is None or chunk.start_time < selection.end_time
+    )
+
+
+def _without_data(chunk: ChunkPlace | StoredChunk) -> ChunkPlace:
+    """Return where a chunk is, so that its data can be read later."""
+    if isinstance(chunk, ChunkPlace):
+        return chunk
+    start, size = chunk.position, chunk.size
+    return ChunkPlace(
+        chunk.where,
+        start,
+        start,
+        size,
+        "",
+        size,
+        chunk.crc,
+        chunk.start_time,
+        chunk.end_time,
+        chunk.message_count,
     )

@@ -84,6 +84,7 @@ class ChunkPlace:
     crc: int
     start_time: int
     end_time: int
+    message_count: int | None = None
 
 
 class McapFile:
@@ -226,6 +227,8 @@ class McapFile:
             chunk.crc,
             chunk.start_time,
             chunk.end_time,
+            chunk.message_count,
+            chunk.start,
         )
 
     def loose_messages(self, first: Place) -> tuple[StoredChunk, int]:
@@ -250,7 +253,8 @@ class McapFile:
             raise self.damaged(first, "it is too short for a message")
         data = memoryview(piece)[:position]
         where = self.where(first.start)
-        return StoredChunk(where, data, "", position, 0, start_time, end_time, count), first.start + position
+        chunk = StoredChunk(where, data, "", position, 0, start_time, end_time, count, first.start)
+        return chunk, first.start + position
 
 
 def opcode_name(opcode: int) -> str:

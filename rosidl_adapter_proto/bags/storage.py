@@ -43,8 +43,12 @@ class StorageReader(Protocol):
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files inside it, one at a time, since they may be large."""
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
         """Yield the chunks that may have messages of a selection, in the order of the file.
+
+        With `in_time_order` they come in the order of their start times, and may still overlap.
 
         A chunk may have other messages as well: `read_records` and `RecordConverter` leave them out. What is in it is
         checked when it is decompressed and walked, by `records_of` and them: of a damaged file that is salvaged, what
