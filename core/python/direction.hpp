@@ -1,4 +1,4 @@
-// The two directions behind one interface. What a direction keeps between measuring and writing can be shared
+// The directions behind one interface. What a direction keeps between measuring and writing can be shared
 // by many messages; a mark says where in it those of one message begin.
 #pragma once
 
@@ -20,6 +20,19 @@ struct CdrToProto {
   static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t mark, Output output,
                     Error& error) {
     return write_cdr_to_proto(plan, input, scratch.lengths, mark, output, error);
+  }
+};
+
+struct Ros1ToProto {
+  using Scratch = CdrToProto::Scratch;
+
+  static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
+                      Error& error) {
+    return measure_ros1_to_proto(plan, input, limit, scratch.lengths, size, error);
+  }
+  static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t mark, Output output,
+                    Error& error) {
+    return write_ros1_to_proto(plan, input, scratch.lengths, mark, output, error);
   }
 };
 

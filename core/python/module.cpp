@@ -3,243 +3,18 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
-#include <algorithm>
-#include <cstring>
-#include <deque>
 #include <rosidl_adapter_proto/packed_fields.hpp>
 #include <string>
 #include <vector>
 
-#include "batch.hpp"
-
-namespace nb = nanobind;
+#include "records.hpp"
+#include "transcoder.hpp"
 
 namespace rosidl_proto {
 namespace {
 
-// From this size on, the time that it takes to give the interpreter lock away and back does not count.
-constexpr uint64_t kLarge = 64 * 1024;
-
 // So many choices of fields a codec remembers.
 constexpr size_t kMaximumChoices = 64;
-
-// The bytes of any contiguous Python buffer, kept alive and, if it can change its size, locked.
-class Buffer {
- public:
-  explicit Buffer(nb::handle object, int flags = PyBUF_SIMPLE) {
-    if (PyObject_GetBuffer(object.ptr(), &view_, flags) != 0) throw nb::python_error();
-  }
-  Buffer(const Buffer&) = delete;
-  Buffer& operator=(const Buffer&) = delete;
-  ~Buffer() { PyBuffer_Release(&view_); }
-
-  const Py_buffer& view() const { return view_; }
-  Input input() const { return {static_cast<const uint8_t*>(view_.buf), static_cast<uint64_t>(view_.len)}; }
-  Output output() const { return {static_cast<uint8_t*>(view_.buf), static_cast<uint64_t>(view_.len)}; }
-
- private:
-  Py_buffer view_{};
-};
-
-// The content of a bytes object, which does not change as long as somebody holds it.
-Input input_of(nb::handle bytes) {
-  return {reinterpret_cast<const uint8_t*>(PyBytes_AS_STRING(bytes.ptr())),
-          static_cast<uint64_t>(PyBytes_GET_SIZE(bytes.ptr()))};
-}
-
-nb::object new_bytes(uint64_t size) {
-  PyObject* const bytes = PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size));
-  if (bytes == nullptr) throw nb::python_error();
-  return nb::steal(bytes);
-}
-
-nb::object new_bytearray(uint64_t size) {
-  PyObject* const bytes = PyByteArray_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size));
-  if (bytes == nullptr) throw nb::python_error();
-  return nb::steal(bytes);
-}
-
-Output output_of(nb::handle bytes, uint64_t size) {
-  return {reinterpret_cast<uint8_t*>(PyBytes_AS_STRING(bytes.ptr())), size};
-}
-
-// Calls `add(input)` for each message that `ranges` finds in `buffer`.
-template <class Add>
-void add_ranges(Input buffer, const Buffer& ranges, Add add) {
-  const Py_buffer& view = ranges.view();
-  const char* format = view.format == nullptr ? "B" : view.format;
-  if (*format == '@' || *format == '=' || *format == '<') ++format;
-  if (view.itemsize != 8 || std::strchr("QLNqln", *format) == nullptr)
-    throw nb::type_error("`ranges` must be a contiguous buffer of 64-bit numbers, such as array('Q')");
-  const auto* const places = static_cast<const uint8_t*>(view.buf);
-  if (view.len % sizeof(Range) != 0)
-    throw nb::value_error(
-        "`ranges` has an odd number of places; give each message its first byte and the one after its last");
-  for (Py_ssize_t at = 0; at < view.len; at += sizeof(Range)) {
-    Range range;
-    std::memcpy(&range, places + at, sizeof range);
-    if (range.first > range.last || range.last > buffer.size) {
-      const std::string number = std::to_string(static_cast<size_t>(at) / sizeof(Range));
-      const std::string text = "message " + number + " is from byte " + std::to_string(range.first) + " to " +
-                               std::to_string(range.last) + ", which is not in a buffer of " +
-                               std::to_string(buffer.size) + " bytes";
-      throw nb::value_error(text.c_str());
-    }
-    add(Input{buffer.data + range.first, range.last - range.first});
-  }
-}
-
-class Transcoder {
- public:
-  Transcoder(nb::bytes plan, std::string type_name, uint64_t size_limit)
-      : type_name_(std::move(type_name)), size_limit_(size_limit) {
-    const char* wrong = plan_.load(static_cast<const uint8_t*>(plan.data()), plan.size());
-    if (wrong != nullptr) throw nb::value_error(wrong);
-  }
-
-  const std::string& type_name() const { return type_name_; }
-
-  template <class Direction>
-  nb::object transcode(nb::handle data) const {
-    if (PyBytes_Check(data.ptr())) return transcode<Direction>(input_of(data));
-    const Buffer buffer(data);
-    return transcode<Direction>(buffer.input());
-  }
-
-  template <class Direction>
-  nb::object transcode(Input input) const {
-    if (input.size >= kLarge && !plan_.partial()) return transcode_large<Direction>(input);
-    // Chosen fields are often among the first, and what follows makes no difference: then this is no large
-    // message.
-    Error error;
-    nb::object result = transcode_small<Direction>({input.data, std::min(input.size, kLarge)}, error);
-    if (result.is_valid()) return result;
-    if (input.size < kLarge) fail(error);
-    return transcode_large<Direction>(input);
-  }
-
-  // Returns the buffer with the results, how much of it they take, their ranges, and the errors by index.
-  template <class Direction>
-  nb::tuple transcode_batch(nb::handle messages, nb::handle ranges, size_t threads, nb::handle into) const {
-    Batch<Direction> batch(plan_, size_limit_);
-    // Whatever is taken here is kept, and what can change its size is locked, until the end.
-    nb::object held;
-    std::deque<Buffer> buffers;
-    if (!ranges.is_none()) {
-      const Buffer places(ranges, PyBUF_FORMAT | PyBUF_C_CONTIGUOUS);
-      batch.reserve(static_cast<size_t>(places.view().len) / sizeof(Range));
-      add_ranges(buffers.emplace_back(messages).input(), places, [&](Input input) { batch.add(input); });
-    } else {
-      // A tuple of our own: taking a buffer can run Python code, which can change a list.
-      held = nb::steal(PySequence_Fast(messages.ptr(), "a batch must be a sequence of messages"));
-      if (held.is_valid()) held = nb::steal(PySequence_Tuple(held.ptr()));
-      if (!held.is_valid()) throw nb::python_error();
-      const Py_ssize_t count = PyTuple_GET_SIZE(held.ptr());
-      batch.reserve(static_cast<size_t>(count));
-      for (Py_ssize_t i = 0; i < count; ++i) {
-        PyObject* const item = PyTuple_GET_ITEM(held.ptr(), i);
-        batch.add(PyBytes_Check(item) ? input_of(item) : buffers.emplace_back(item).input());
-      }
-    }
-    nb::object places = new_bytes(batch.size() * sizeof(Range));
-    auto* const found = reinterpret_cast<Range*>(PyBytes_AS_STRING(places.ptr()));
-    nb::object result = into.is_none() ? new_bytearray(0) : nb::borrow(into);
-    uint64_t size;
-    for (;;) {
-      const Buffer buffer(result, PyBUF_WRITABLE);
-      const Output output = buffer.output();
-      for (size_t i = 0; i < batch.size(); ++i) {
-        if (overlap(batch[i], output))
-          throw nb::value_error("`into` is memory of the messages; give other memory");
-      }
-      {
-        nb::gil_scoped_release release;
-        size = batch.run(threads, output, found);
-      }
-      if (size <= output.size) break;
-      if (!into.is_none()) throw_too_small(size, output.size);
-      result = new_bytearray(size);  // The first time was to find the size.
-    }
-    nb::dict errors;
-    for (size_t i = 0; i < batch.size(); ++i) {
-      if (found[i].missing()) errors[nb::int_(i)] = exception(batch.error(i), nb::int_(i));
-    }
-    return nb::make_tuple(result, size, places, errors);
-  }
-
- private:
-  // Transcodes what takes less time than giving the interpreter lock away; if there is an error, nothing is
-  // returned.
-  template <class Direction>
-  nb::object transcode_small(Input input, Error& error) const {
-    typename Direction::Scratch scratch(plan_);
-    uint64_t size = 0;
-    if (!Direction::measure(plan_, input, size_limit_, scratch, &size, error)) return {};
-    nb::object result = new_bytes(size);
-    if (!Direction::write(plan_, input, scratch, 0, output_of(result, size), error)) return {};
-    return result;
-  }
-
-  template <class Direction>
-  nb::object transcode_large(Input input) const {
-    Error error;
-    typename Direction::Scratch scratch(plan_);
-    uint64_t size = 0;
-    bool good;
-    {
-      nb::gil_scoped_release release;
-      good = Direction::measure(plan_, input, size_limit_, scratch, &size, error);
-    }
-    if (!good) fail(error);
-    nb::object result = new_bytes(size);
-    const Output output = output_of(result, size);
-    {
-      nb::gil_scoped_release release;
-      good = Direction::write(plan_, input, scratch, 0, output, error);
-    }
-    if (!good) fail(error);
-    return result;
-  }
-
-  static bool overlap(Input input, Output output) {
-    const auto a = reinterpret_cast<uintptr_t>(input.data), b = reinterpret_cast<uintptr_t>(output.data);
-    return a < b + output.size && b < a + input.size;
-  }
-
-  static nb::object error_class(const char* name) {
-    return nb::module_::import_("rosidl_adapter_proto.transcode.error").attr(name);
-  }
-
-  [[noreturn]] static void raise(const nb::object& exception) {
-    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
-    throw nb::python_error();
-  }
-
-  [[noreturn]] static void throw_too_small(uint64_t needed, uint64_t size) {
-    raise(error_class("BufferTooSmallError")(needed, size));
-  }
-
-  nb::object exception(const Error& error, nb::object batch_index) const {
-    const std::string path = field_path(error, plan_), text = reason(error);
-    return error_class("TranscodeError")(type_name_, path, error.offset, text, batch_index);
-  }
-
-  [[noreturn]] void fail(const Error& error) const { raise(exception(error, nb::none())); }
-
-  Plan plan_;
-  std::string type_name_;
-  uint64_t size_limit_;
-};
-
-// The object behind `self`. It is missing where a class derives from ours and does not call its `__init__`.
-template <class T>
-T& object_of(PyObject* self) {
-  if (!nb::inst_ready(self)) {
-    PyErr_SetString(PyExc_TypeError, "__init__ of the base class has not been called");
-    throw nb::python_error();
-  }
-  return *nb::inst_ptr<T>(self);
-}
 
 // The two directions from and to message objects. Python would do it in two lines, at twice the cost for
 // small messages.
@@ -395,6 +170,9 @@ PyMethodDef transcoder_methods[] = {
      "cdr_to_proto($self, data, /)\n--\n\nTurn a serialized ROS message into a serialized protobuf message."},
     {"proto_to_cdr", transcode<ProtoToCdr>, METH_O,
      "proto_to_cdr($self, data, /)\n--\n\nTurn a serialized protobuf message into a serialized ROS message."},
+    {"ros1_to_proto", transcode<Ros1ToProto>, METH_O,
+     "ros1_to_proto($self, data, /)\n--\n\nTurn a message serialized by ROS 1 into a serialized protobuf "
+     "message."},
     {nullptr, nullptr, 0, nullptr}};
 PyType_Slot transcoder_slots[] = {{Py_tp_methods, transcoder_methods}, {0, nullptr}};
 
@@ -429,4 +207,5 @@ NB_MODULE(_core, module) {
            nb::arg(), nb::arg().none());
   nb::class_<Codec>(module, "Codec", nb::type_slots(codec_slots))
       .def(nb::init<nb::handle_t<Transcoder>, nb::object>(), nb::arg("transcoder"), nb::arg("message_class"));
+  define_records(module);
 }

@@ -14,11 +14,28 @@ namespace {
 
 constexpr uint64_t kCdrHeader = 4;
 
-template <bool kSwap>
+// How messages are laid out. ROS 1 has what is CDR without all that CDR adds
+// (https://wiki.ros.org/ROS/Technical%20Overview#Message_serialization_and_msg_MD5_sums).
+struct PlainCdr {
+  static constexpr uint64_t kHeader = kCdrHeader;
+  static constexpr bool kAligned = true;     // numbers lie at multiples of their size
+  static constexpr bool kTerminated = true;  // a string ends with NUL, which its length counts
+  static constexpr bool kPadded = true;      // bytes may follow the last field
+  static constexpr bool kFilled = true;      // an empty message has a byte
+};
+struct Ros1 {
+  static constexpr uint64_t kHeader = 0;
+  static constexpr bool kAligned = false, kTerminated = false, kPadded = false, kFilled = false;
+};
+
+// So many elements that take no bytes a message may have, since its size does not bound them.
+constexpr uint32_t kMaximumWithoutBytes = 0x10000;
+
+template <bool kSwap, class Layout = PlainCdr>
 class CdrInput {
  public:
   CdrInput(Input cdr, Error& error)
-      : origin_(cdr.data + kCdrHeader), end_(cdr.data + cdr.size), error_(error) {}
+      : origin_(cdr.data + Layout::kHeader), end_(cdr.data + cdr.size), error_(error) {}
 
   const uint8_t* origin() const { return origin_; }
   uint64_t left(const uint8_t* p) const { return static_cast<uint64_t>(end_ - p); }
@@ -26,7 +43,7 @@ class CdrInput {
 
   const uint8_t* fail(Reason reason, const uint8_t* p, uint64_t a = 0, uint64_t b = 0) {
     error_.reason = reason;
-    error_.offset = offset(p) + kCdrHeader;
+    error_.offset = offset(p) + Layout::kHeader;
     error_.a = a;
     error_.b = b;
     return nullptr;
@@ -34,7 +51,7 @@ class CdrInput {
 
   // Goes to the alignment of numbers of `size` bytes, counted from after the header, with `size` bytes there.
   ROSIDL_PROTO_INLINE const uint8_t* align_to(const uint8_t* p, uint64_t size) {
-    const uint64_t padding = (0 - offset(p)) & (size - 1);
+    const uint64_t padding = Layout::kAligned ? (0 - offset(p)) & (size - 1) : 0;
     if (left(p) < padding + size) return fail(Reason::Truncated, p, padding + size, left(p));
     return p + padding;
   }
@@ -65,15 +82,24 @@ class CdrInput {
       if ((p = count(p, number)) == nullptr) return nullptr;
       if (*number > op.count) return fail(Reason::SequenceBound, p - 4, *number, op.count);
     }
+    if (!Layout::kFilled && minimum == 0) return elements_without_bytes(before, *number) ? p : nullptr;
     // `minimum` is at most 2^40 and the count below 2^32: the division keeps the product out.
     if (*number > left(p) / minimum) return fail(Reason::Count, before, *number, left(p));
     return p;
   }
 
  private:
+  bool elements_without_bytes(const uint8_t* p, uint32_t number) {
+    if (number > without_bytes_)
+      return fail(Reason::WithoutBytes, p, number, kMaximumWithoutBytes) != nullptr;
+    without_bytes_ -= number;
+    return true;
+  }
+
   const uint8_t* const origin_;
   const uint8_t* const end_;
   Error& error_;
+  uint32_t without_bytes_ = kMaximumWithoutBytes;  // that may still come
 };
 
 // Numbers that stand side by side in CDR.

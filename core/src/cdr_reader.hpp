@@ -1,4 +1,4 @@
-// Reads CDR along a plan, in either byte order, and drives a sink.
+// Reads CDR along a plan, in either byte order, or what ROS 1 has instead, and drives a sink.
 #pragma once
 
 #include "cdr.hpp"
@@ -11,7 +11,7 @@ namespace {
 // `kSwap`: the bytes of numbers are in the other order than here. `kChecked`: what values are is checked,
 // which has happened when writing follows measuring; that nothing lies outside of the input is always
 // checked.
-template <bool kSwap, bool kChecked, class Sink>
+template <bool kSwap, bool kChecked, class Sink, class Layout = PlainCdr>
 class CdrReader {
   using At = typename Sink::At;
 
@@ -40,6 +40,7 @@ class CdrReader {
   // bounded types the maximum, else too many for wide strings (one character) and for empty sequences of
   // 8-byte numbers (their alignment), which can then move what follows by another alignment.
   bool is_padding(const uint8_t* p) const {
+    if (!Layout::kPadded) return input_.left(p) == 0;
     const uint64_t full = plan_.root().full_size.from(0);
     const uint64_t maximum = full <= kMaximumSize ? full + 3 : 0;
     return input_.left(p) <= 3 + slack_ || input_.left(input_.origin()) <= maximum;
@@ -61,6 +62,7 @@ class CdrReader {
   Cursor message(const Message& message, Cursor c) {
     const Operation* const last = plan_.end(message);
     for (const Operation* op = plan_.begin(message); op != last; ++op) {
+      if (is_absent(*op)) continue;
       if (op->reading == Reading::One) {
         c = one(*op, c);
       } else if (op->reading == Reading::Many) {
@@ -84,6 +86,7 @@ class CdrReader {
         if (p == nullptr) return failed();
         const auto raw = CdrInput<kSwap>::template load<typename F::Raw>(p);
         if (kChecked && !F::is_value(raw)) return not_a_value(op, p, raw);
+        if (kChecked && !Layout::kFilled && op.other_sign && raw >> 31 != 0) return not_in_ros2(op, p, raw);
         return take(p + F::kSize, sink_.template number<F>(op, c.at, raw), p);
       } else if constexpr (F::kIsString) {
         return string<F>(op, c, kNoElement);
@@ -121,6 +124,8 @@ class CdrReader {
     return c;
   }
 
+  static bool is_absent(const Operation& op) { return !Layout::kFilled && op.filler; }
+
   // Finds the end of a field without looking at more than that takes.
   const uint8_t* skip(const Operation& op, const uint8_t* p) {
     return visit(op.cdr, [&](auto form) ROSIDL_PROTO_INLINE_LAMBDA -> const uint8_t* {
@@ -135,7 +140,7 @@ class CdrReader {
         if (!single && (p = input_.elements(op, p, minimum_size<F>(op), &count)) == nullptr) return nullptr;
         if constexpr (!F::kIsString) {
           const Message& part = plan_.message(op.message);
-          if (part.fixed) {
+          if (Layout::kAligned && part.fixed) {
             const uint64_t size = part.default_size.from(input_.offset(p), count);
             return input_.need(p, size) == nullptr ? nullptr : p + size;
           }
@@ -160,6 +165,7 @@ class CdrReader {
       const Message& part = plan_.message(op.message);
       const Operation* const last = plan_.end(part);
       for (const Operation* field = plan_.begin(part); field != last; ++field) {
+        if (is_absent(*field)) continue;
         if ((p = skip(*field, p)) != nullptr) continue;
         error_.leave(static_cast<uint32_t>(field - &plan_.operation(0)));
         break;
@@ -173,7 +179,8 @@ class CdrReader {
     if constexpr (F::kIsString) {
       return F::kMinimumSize;
     } else {
-      return plan_.message(op.message).minimum_size;
+      const Message& part = plan_.message(op.message);
+      return Layout::kFilled ? part.minimum_size : part.ros1_minimum_size;
     }
   }
 
@@ -230,6 +237,11 @@ class CdrReader {
     return fail(Reason::CdrValue, p, raw, static_cast<uint64_t>(op.cdr));
   }
 
+  Cursor not_in_ros2(const Operation& op, const uint8_t* p, uint64_t raw) {
+    return op.cdr == CdrForm::Int32 ? fail(Reason::Ros1Time, p, raw)
+                                    : fail(Reason::Ros1Duration, p, (uint64_t{1} << 32) - raw);
+  }
+
   // Strings
   // ----------------------------------------------------------------------------------------------------------
 
@@ -245,6 +257,7 @@ class CdrReader {
       return p + *units * F::kUnitSize;
     } else {
       const uint32_t length = *units;
+      if (!Layout::kTerminated) return input_.need(p, length) == nullptr ? nullptr : p + length;
       if (length == 0) return p;  // Not in the standard, but Fast CDR and others read and write it
       if (input_.need(p, length) == nullptr) return nullptr;
       *units = length - 1;
@@ -263,7 +276,7 @@ class CdrReader {
       if (kChecked && !check_wide(op, wide)) return failed();
       return take(p, sink_.wstring(op, c.at, element, wide), content);
     } else {
-      if (p != content && p[-1] != 0) return fail(Reason::NoTerminator, p - 1);
+      if (Layout::kTerminated && p != content && p[-1] != 0) return fail(Reason::NoTerminator, p - 1);
       const Text text{content, units};
       if (kChecked && !check_text(op, text)) return failed();
       return take(p, sink_.string(op, c.at, element, text), content);
@@ -302,7 +315,7 @@ class CdrReader {
   }
 
   const Plan& plan_;
-  CdrInput<kSwap> input_;
+  CdrInput<kSwap, Layout> input_;
   Sink sink_;
   Error& error_;
   uint64_t slack_ = 0;

@@ -31,6 +31,14 @@ const char* text_of(Reason reason) {
              "type";
     case Reason::Trailing:
       return "{a} bytes follow the last field; the data is of another type";
+    case Reason::WithoutBytes:
+      return "{a} elements that take no bytes are announced, and a message may have {b}; the data is damaged "
+             "or "
+             "of another type";
+    case Reason::Ros1Time:
+      return "{a} seconds do not fit int32, which a time has in ROS 2; give a time before 2038";
+    case Reason::Ros1Duration:
+      return "-{a} nanoseconds do not fit uint32, which a duration has in ROS 2; give nanoseconds from 0 on";
     case Reason::WireTruncated:
       return "{a} bytes are needed and {b} are left; the data is cut off or no protobuf message";
     case Reason::WireVarint:

@@ -54,8 +54,9 @@ Advance number(uint64_t size) {
 struct Extent {
   Advance usual, full;  // of the default value, and of the largest one
   uint64_t minimum;     // without alignment
-  bool fixed;           // all values need the same
-  uint64_t alignment;   // of a number; the fields of a message have their own
+  uint64_t ros1_minimum;
+  bool fixed;          // all values need the same
+  uint64_t alignment;  // of a number; the fields of a message have their own
 };
 
 Extent element_extent(const Operation& op, const std::vector<Message>& messages) {
@@ -63,16 +64,16 @@ Extent element_extent(const Operation& op, const std::vector<Message>& messages)
     using F = decltype(form);
     if constexpr (F::kIsNumber) {
       const Advance advance = number(F::kSize);
-      return {advance, advance, F::kMinimumSize, true, F::kSize};
+      return {advance, advance, F::kMinimumSize, F::kMinimumSize, true, F::kSize};
     } else if constexpr (F::kIsString) {
       const Advance empty = then(number(4), constant(F::kTerminator * F::kUnitSize));
       // As rmw_fastrtps estimates it: one unit for each character, and one more.
       const uint64_t most =
           op.string_bound == kUnbounded ? kTooLarge : (uint64_t{op.string_bound} + 1) * F::kUnitSize;
-      return {empty, then(number(4), constant(most)), F::kMinimumSize, false, 1};
+      return {empty, then(number(4), constant(most)), F::kMinimumSize, F::kMinimumSize, false, 1};
     } else {
       const Message& part = messages[op.message];
-      return {part.default_size, part.full_size, part.minimum_size, part.fixed, 1};
+      return {part.default_size, part.full_size, part.minimum_size, part.ros1_minimum_size, part.fixed, 1};
     }
   });
 }
@@ -86,6 +87,7 @@ Extent extent(const Operation& op, const std::vector<Message>& messages) {
       one.usual = repeat(one.usual, op.count);
       one.full = repeat(one.full, op.count);
       one.minimum = times(one.minimum, op.count);
+      one.ros1_minimum = times(one.ros1_minimum, op.count);
       break;
     case Shape::Sequence: {
       const bool bounded = op.count != kUnbounded;
@@ -93,7 +95,7 @@ Extent extent(const Operation& op, const std::vector<Message>& messages) {
       one.full = then(one.usual, !bounded        ? constant(kTooLarge)
                                  : op.count == 0 ? constant(0)
                                                  : repeat(one.full, op.count));
-      one.minimum = 4;
+      one.minimum = one.ros1_minimum = 4;
       one.fixed = false;
       break;
     }
@@ -267,6 +269,16 @@ const char* Plan::derive() {
   return nullptr;
 }
 
+// ROS 1 has unsigned seconds in a time, and signed nanoseconds in a duration
+// (https://wiki.ros.org/msg#Field_Types); ROS 2 has it the other way round.
+void Plan::derive_ros1(const Message& message, Operation& op) const {
+  const std::string type = text(message.name), field = text(op.name);
+  op.filler = field == "structure_needs_at_least_one_member" && op.protobuf == ProtobufForm::None;
+  op.other_sign =
+      (type == "builtin_interfaces/msg/Time" && field == "sec" && op.cdr == CdrForm::Int32) ||
+      (type == "builtin_interfaces/msg/Duration" && field == "nanosec" && op.cdr == CdrForm::Uint32);
+}
+
 const char* Plan::derive(Message& message) {
   uint32_t deepest = 0;
   message.fixed = true;
@@ -282,6 +294,8 @@ const char* Plan::derive(Message& message) {
     message.default_size = then(message.default_size, field.usual);
     message.full_size = then(message.full_size, field.full);
     message.minimum_size = saturate(message.minimum_size + field.minimum);
+    derive_ros1(message, op);
+    if (!op.filler) message.ros1_minimum_size = saturate(message.ros1_minimum_size + field.ros1_minimum);
     message.fixed = message.fixed && field.fixed;
   }
   const Advance& whole = message.default_size;

@@ -27,12 +27,18 @@ class StorageReader(Protocol):
         warnings: What is odd about the file, for people, such as that it has no summary.
     """
 
-    path: str
-    storage: str
-    topics: Mapping[int, Topic]
-    statistics: Statistics
-    metadata: Sequence[tuple[str, Mapping[str, str]]]
-    warnings: Sequence[str]
+    @property
+    def path(self) -> str: ...
+    @property
+    def storage(self) -> str: ...
+    @property
+    def topics(self) -> Mapping[int, Topic]: ...
+    @property
+    def statistics(self) -> Statistics: ...
+    @property
+    def metadata(self) -> Sequence[tuple[str, Mapping[str, str]]]: ...
+    @property
+    def warnings(self) -> Sequence[str]: ...
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files inside it, one at a time, since they may be large."""

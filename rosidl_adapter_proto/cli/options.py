@@ -70,6 +70,28 @@ def source_options(command: Command) -> Command:
     return setting_option("include")(setting_option("distro")(command))
 
 
+def plugin_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the option that names converter plugins; they reach the command with all others as `registry`."""
+
+    @click.option(
+        "--plugin",
+        "plugins",
+        multiple=True,
+        metavar="MODULE:CLASS",
+        help="A converter plugin that no installed package brings; Python has to find its module. May be repeated.",
+    )
+    @wraps(command)
+    def with_registry(plugins: tuple[str, ...], **values: Any) -> Any:
+        from rosidl_adapter_proto.converters import ConverterRegistry
+
+        registry = ConverterRegistry()
+        for each in plugins:
+            registry.load(each)
+        return command(registry=registry, **values)
+
+    return with_registry
+
+
 def generate_options(settings: Iterable[Setting]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return the decorator that gives a command options of how to generate, which reach it as `options`."""
     rows = tuple(settings)

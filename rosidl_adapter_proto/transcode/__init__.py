@@ -14,6 +14,14 @@ except ImportError as error:
     ) from error
 
 from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE, Batch, Codec, Transcoder
-from rosidl_adapter_proto.transcode.error import BufferTooSmallError, TranscodeError
+from rosidl_adapter_proto.transcode.error import BufferTooSmallError, RecordsError, TranscodeError
 
-__all__ = ["MAXIMUM_SIZE", "Batch", "BufferTooSmallError", "Codec", "TranscodeError", "Transcoder"]
+__all__ = [
+    "MAXIMUM_SIZE",
+    "Batch",
+    "BufferTooSmallError",
+    "Codec",
+    "RecordsError",
+    "TranscodeError",
+    "Transcoder",
+]

@@ -1,6 +1,6 @@
 """The native transcoder: CDR to protobuf and back."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import Generic, TypeVar
 
 from google.protobuf.message import Message
@@ -24,6 +24,51 @@ def packed_fields(
         ValueError: The serialized message is not of this form.
     """
 
+def read_records(
+    data: Buffer, topic_ids: Collection[int] | None, start_time: int, end_time: int | None, /
+) -> tuple[bytes, bytes, bytes, bytes, bytes, list[tuple[int, int, int]]]:
+    """Return the columns of the messages of a chunk, as in `records.Records`, and of each record that is no message
+    the opcode, the first byte of its content and the one after the last."""
+
+def pack_records(
+    topic_ids: Buffer,
+    sequences: Buffer,
+    log_times: Buffer,
+    publish_times: Buffer,
+    messages: Sequence[Buffer],
+) -> bytearray:
+    """Return message records, one after the other, as they stand in a chunk.
+
+    Args:
+        topic_ids: The topic id of each message: unsigned numbers of 16 bits, as `array("H")` and numpy have them.
+        sequences: The sequence number of each, of 32 bits.
+        log_times: When each was recorded, in nanoseconds: numbers of 64 bits.
+        publish_times: When each was published, in nanoseconds: numbers of 64 bits.
+        messages: Their data.
+
+    Raises:
+        RecordsError: The chunk would be larger than 2^32 - 1 bytes.
+        ValueError: There are not as many numbers as messages.
+        TypeError: Numbers do not have the size that they should have.
+    """
+
+def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int], int, int]:
+    """Return what `records.RecordIndex` has."""
+
+class Memory(Buffer):
+    """Memory of the native module, as a buffer that cannot be written to."""
+
+class RecordConverter:
+    def __init__(self, routes: Sequence[tuple[int, str, int, Transcoder | None, int | None]]) -> None:
+        """Take the routes: the topic id in the chunk, what to do, the topic id in the result, the transcoder, and the
+        topic id of messages that cannot be transcoded."""
+
+    def _convert(
+        self, data: Buffer, start_time: int, end_time: int | None, /
+    ) -> tuple[Memory, int, list[tuple[int, int, int, int, TranscodeError]]]:
+        """Return the new chunk, how many messages it has, and of those that failed topic id, log time, sequence number,
+        index and error."""
+
 class Transcoder:
     def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...
     @property
@@ -35,6 +80,9 @@ class Transcoder:
 
     def proto_to_cdr(self, data: Buffer, /) -> bytes:
         """Turn a serialized protobuf message into a serialized ROS message."""
+
+    def ros1_to_proto(self, data: Buffer, /) -> bytes:
+        """Turn a message serialized by ROS 1 into a serialized protobuf message."""
 
     def _cdr_to_proto_batch(
         self, messages: Iterable[Buffer] | Buffer, ranges: Buffer | None, threads: int, into: Buffer | None, /

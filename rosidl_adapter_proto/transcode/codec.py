@@ -75,6 +75,9 @@ class Transcoder(_core.Transcoder):
 
     - `cdr_to_proto(data)` reads plain CDR of either byte order and returns a serialized protobuf message.
     - `proto_to_cdr(data)` reads a protobuf message and returns little-endian plain CDR, as rclpy publishes it.
+    - `ros1_to_proto(data)` reads a message as ROS 1 serializes it. The type is the one that ROS 2 would have, with
+      `builtin_interfaces/msg/Time` and `Duration`; a time after 2038 and negative nanoseconds, which these do not have,
+      are errors.
     - `cdr_to_proto_batch(messages)` and `proto_to_cdr_batch(messages)` do the same for many messages.
 
     Fields that are unknown to the type are skipped. An array that is absent in protobuf is an array of zeros.

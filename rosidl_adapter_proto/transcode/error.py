@@ -56,3 +56,20 @@ class BufferTooSmallError(Error, ValueError):
             f"the results take {self.needed} bytes and `into` has {self.size};"
             f" give a buffer of at least {self.needed} bytes"
         )
+
+
+class RecordsError(Error):
+    """A chunk of a recording is damaged, or cannot be converted.
+
+    Attributes:
+        byte_offset: Where in the chunk the record is that is wrong.
+        reason: What is wrong there, and what to do.
+    """
+
+    def __init__(self, byte_offset: int, reason: str) -> None:
+        super().__init__(byte_offset, reason)
+        self.byte_offset = byte_offset
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"byte {self.byte_offset} of the chunk: {self.reason}"

@@ -207,6 +207,7 @@ def test_every_command_is_listed(run: Run) -> None:
     listed = run("--help").out.partition("Commands:\n")[2]
 
     assert [line.split()[0] for line in listed.splitlines()] == [
+        "bag",
         "cmake-dir",
         "completion",
         "generate",

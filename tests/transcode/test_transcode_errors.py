@@ -118,12 +118,12 @@ FROM_CDR = {
     "bool": (
         "Flags",
         cdr("B3xI", 2, 0),
-        f".flag at byte 4: a boolean is 0 or 1 in CDR and this one is 2; {TYPE}",
+        f".flag at byte 4: a boolean is 0 or 1 and this one is 2; {TYPE}",
     ),
     "bools": (
         "Flags",
         cdr("B3xI3B", 1, 3, 1, 0, 255),
-        f".flags[2] at byte 14: a boolean is 0 or 1 in CDR and this one is 255; {TYPE}",
+        f".flags[2] at byte 14: a boolean is 0 or 1 and this one is 255; {TYPE}",
     ),
     "trailing": (
         "Flags",

@@ -18,6 +18,10 @@ enum class Reason : uint8_t {
   NoTerminator,
   WstringUnit,
   Trailing,
+  // of ROS 1
+  WithoutBytes,
+  Ros1Time,
+  Ros1Duration,
   // of protobuf
   WireTruncated,
   WireVarint,

@@ -196,7 +196,7 @@ struct Form<CdrForm::Boolean> : NumberForm<uint8_t, ProtobufForm::Bool, Protobuf
   static constexpr bool kCopiesToProtobuf = true;
   static constexpr bool kTakesAll = false;
   static constexpr bool is_value(uint8_t raw) { return raw <= 1; }
-  static constexpr const char* kValues = "a boolean is 0 or 1 in CDR";
+  static constexpr const char* kValues = "a boolean is 0 or 1";
   static constexpr uint64_t to_wire(uint8_t raw) { return raw; }
   static constexpr uint8_t from_wire(uint64_t value) { return value != 0; }
 };

@@ -58,6 +58,8 @@ struct Operation {
   uint32_t string_bound;  // in characters
   uint32_t message;       // index of the nested message
   uint32_t number;        // field number
+  bool filler;            // what ROS 2 has in an empty message, and ROS 1 has not
+  bool other_sign;        // a number with a sign in ROS 2 or in ROS 1, but not in both
   uint32_t place[8];  // of a message of fixed size: where the field begins, for each start offset modulo 8
   Name name, protobuf_name;
 };
@@ -85,8 +87,9 @@ struct Message {
   uint32_t slots;         // operations along the longest way down from here, itself included
   bool fixed;             // every value has the same size in CDR
   uint64_t minimum_size;  // in CDR, without alignment
-  Advance default_size;   // in CDR, of the default value
-  Advance full_size;      // the same with everything at its bound; more than kMaximumSize if unbounded
+  uint64_t ros1_minimum_size;
+  Advance default_size;  // in CDR, of the default value
+  Advance full_size;     // the same with everything at its bound; more than kMaximumSize if unbounded
 };
 
 class Plan {
@@ -112,6 +115,7 @@ class Plan {
   const char* read(const uint8_t* data, size_t size);
   const char* derive();
   const char* derive(Message& message);
+  void derive_ros1(const Message& message, Operation& op) const;
   const char* order(Message& message);
 
   std::vector<Message> messages_;

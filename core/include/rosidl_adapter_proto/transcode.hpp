@@ -1,5 +1,5 @@
-// CDR to protobuf and protobuf to CDR, each in two steps: measure, then write into a buffer of exactly that
-// size.
+// CDR to protobuf, protobuf to CDR and ROS 1 to protobuf, each in two steps: measure, then write into a
+// buffer of exactly that size.
 //
 // Nothing here throws, keeps state or reads past what it was given. The input may even change between the two
 // steps: the second one checks every read and write again. Stack use is bounded by kMaximumDepth.
@@ -35,6 +35,7 @@ class Lengths {
   }
 
   uint64_t size() const { return size_; }
+  void clear() { size_ = 0; }
   uint32_t& operator[](uint64_t index) { return data_[index]; }
   uint32_t operator[](uint64_t index) const { return data_[index]; }
 
@@ -93,6 +94,13 @@ bool measure_cdr_to_proto(const Plan& plan, Input cdr, uint64_t limit, Lengths& 
 // Writes what was measured. `first` is the number of lengths that there were before measuring.
 bool write_cdr_to_proto(const Plan& plan, Input cdr, const Lengths& lengths, uint64_t first, Output proto,
                         Error& error) noexcept;
+
+// The same for messages as ROS 1 serializes them. A time after 2038 or a duration with negative nanoseconds,
+// which ROS 2 does not have, is an error.
+bool measure_ros1_to_proto(const Plan& plan, Input ros1, uint64_t limit, Lengths& lengths, uint64_t* size,
+                           Error& error) noexcept;
+bool write_ros1_to_proto(const Plan& plan, Input ros1, const Lengths& lengths, uint64_t first, Output proto,
+                         Error& error) noexcept;
 
 // Finds the size of the CDR message, header included.
 bool measure_proto_to_cdr(const Plan& plan, Input proto, uint64_t limit, Fields& fields, uint64_t* size,

@@ -1,0 +1,308 @@
+"""What is in an MCAP file besides its messages: from its summary, or where that is missing, from the whole file."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from mcap import records
+from mcap.opcode import Opcode
+
+from rosidl_adapter_proto.bags.compression import COMPRESSIONS, records_of
+from rosidl_adapter_proto.bags.mcap_records import (
+    FOOTER_SIZE,
+    MAGIC,
+    PIECE_SIZE,
+    RECORD_HEAD,
+    ChunkPlace,
+    McapFile,
+    Place,
+    opcode_name,
+    parse,
+)
+from rosidl_adapter_proto.bags.model import Statistics, StoredChunk
+from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.error import RecordsError
+from rosidl_adapter_proto.transcode.records import read_records
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+Damaged = Callable[[BagError], None]
+"""What is called with each damage that is found: it raises it, or notes it, and then what can be read is read."""
+
+# Where a message or a chunk may begin, with a length below 2^48: how reading goes on behind what is no record.
+_CANDIDATE = re.compile(rb"[\x05\x06].{6}\x00\x00", re.DOTALL)
+_BELIEVABLE_RECORDS = 3
+
+
+@dataclass
+class Contents:
+    """What is in a file besides its messages.
+
+    Attributes:
+        schemas: The schemas, by id.
+        channels: The channels, by id.
+        metadata: The metadata records, in the order of the file.
+        attachments: Where the attachments are.
+        statistics: How many messages there are.
+        chunk_count: How many chunks the summary says there are; None without a summary.
+        chunk_topics: The channels that have messages in a chunk, by the chunk's place, as far as the summary says.
+    """
+
+    schemas: dict[int, records.Schema] = field(default_factory=dict)
+    channels: dict[int, records.Channel] = field(default_factory=dict)
+    metadata: list[records.Metadata] = field(default_factory=list)
+    attachments: list[Place] = field(default_factory=list)
+    statistics: Statistics = field(default_factory=Statistics)
+    chunk_count: int | None = None
+    chunk_topics: dict[int, frozenset[int]] = field(default_factory=dict)
+
+
+def find_end(file: McapFile) -> int | None:
+    """Return the place behind the recording, which is the end of the file unless there is garbage behind it.
+
+    Returns:
+        None if the recording was not finished, or is damaged.
+    """
+    if read_footer(file) is not None:
+        return file.size
+    try:
+        for place in file.places(len(MAGIC), file.size):
+            end = place.end + len(MAGIC)
+            if place.opcode == Opcode.FOOTER and end <= file.size and file.read(place.end, end) == MAGIC:
+                return end
+    except BagError:
+        return None
+    return None
+
+
+def read_footer(file: McapFile) -> records.Footer | None:
+    """Return the footer, which is at the end of a file that was finished; None where the end is missing."""
+    start = file.size - FOOTER_SIZE - len(MAGIC)
+    if start < len(MAGIC) or file.read(file.size - len(MAGIC), file.size) != MAGIC:
+        return None
+    if RECORD_HEAD.unpack(file.read(start, start + RECORD_HEAD.size)) != (Opcode.FOOTER, 20):
+        return None
+    return file.record(records.Footer, file.place(start, file.size))
+
+
+def read_summary(file: McapFile) -> Contents | None:
+    """Return what the summary says; None if it leaves out some of it, as it may.
+
+    Raises:
+        BagError: The summary is damaged, or points to what is not there.
+    """
+    footer = read_footer(file)
+    if footer is None or not footer.summary_start:
+        return None
+    end = file.size - FOOTER_SIZE - len(MAGIC)
+    if not len(MAGIC) <= footer.summary_start <= end:
+        raise BagError(
+            f"{file.where(end)}: the summary should begin at byte {footer.summary_start}, where it cannot"
+        )
+    if footer.summary_crc:
+        crc = file.crc(footer.summary_start, file.size - len(MAGIC) - 4)
+        if crc != footer.summary_crc:
+            raise BagError(
+                f"{file.where(footer.summary_start)}: the summary is damaged: its checksum is {crc:#010x} and should be"
+                f" {footer.summary_crc:#010x}"
+            )
+    contents = Contents()
+    statistics = None
+    known_topics: dict[frozenset[int], frozenset[int]] = {}
+    for place in file.places(footer.summary_start, end):
+        if place.opcode == Opcode.SCHEMA:
+            add_schema(contents, file.record(records.Schema, place), file.where(place.start))
+        elif place.opcode == Opcode.CHANNEL:
+            add_channel(contents, file.record(records.Channel, place), file.where(place.start))
+        elif place.opcode == Opcode.STATISTICS:
+            statistics = file.record(records.Statistics, place)
+        elif place.opcode == Opcode.METADATA_INDEX:
+            indexed = _indexed(file, file.record(records.MetadataIndex, place).offset, Opcode.METADATA, place)
+            contents.metadata.append(file.record(records.Metadata, indexed))
+        elif place.opcode == Opcode.ATTACHMENT_INDEX:
+            offset = file.record(records.AttachmentIndex, place).offset
+            contents.attachments.append(_indexed(file, offset, Opcode.ATTACHMENT, place))
+        elif place.opcode == Opcode.CHUNK_INDEX:
+            index = file.record(records.ChunkIndex, place)
+            topics = frozenset(index.message_index_offsets)
+            if topics:
+                contents.chunk_topics[index.chunk_start_offset] = known_topics.setdefault(topics, topics)
+    if statistics is None or not _complete(contents, statistics):
+        return None
+    contents.statistics = Statistics(
+        statistics.channel_message_counts, statistics.message_start_time, statistics.message_end_time
+    )
+    if contents.statistics.message_count != statistics.message_count:
+        raise BagError(
+            f"{file.where(footer.summary_start)}: the summary counts {statistics.message_count} messages, and"
+            f" {contents.statistics.message_count} in the sum of its topics"
+        )
+    contents.chunk_count = statistics.chunk_count
+    return contents
+
+
+def scan(file: McapFile, damaged: Damaged) -> Contents:
+    """Return what is in the whole file, which is read once for it."""
+    contents = Contents()
+    counts: Counter[int] = Counter()
+    times: list[int] = []
+    for found in walk(file, file.size, damaged):
+        try:
+            if isinstance(found, Place):
+                _add(contents, file, found)
+                continue
+            chunk = file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
+            messages = read_records(records_of(chunk))
+            for opcode, content in messages.others:
+                _add_inside(contents, opcode, content, chunk.where)
+        except RecordsError as error:
+            damaged(BagError(f"{chunk.where}: the chunk is damaged: {error}"))
+            continue
+        except BagError as error:
+            damaged(error)
+            continue
+        counts.update(messages.topic_ids)
+        if len(messages.log_times):
+            times += min(messages.log_times), max(messages.log_times)
+    contents.statistics = Statistics(dict(counts), min(times, default=0), max(times, default=0))
+    return contents
+
+
+def walk(file: McapFile, end: int, damaged: Damaged) -> Iterator[Place | ChunkPlace | StoredChunk]:
+    """Yield what is in the data section, in its order: chunks, messages without one, and places of other records.
+
+    Args:
+        file: The file.
+        end: Where the data section ends at the latest.
+        damaged: What to do where there is no record; if it returns, the next message or chunk is looked for.
+    """
+    start = len(MAGIC)
+    while start < end:
+        try:
+            place = file.place(start, end)
+            if (place.opcode, place.end - place.content) in ((Opcode.DATA_END, 4), (Opcode.FOOTER, 20)):
+                return
+            found: Place | ChunkPlace | StoredChunk = place
+            following = place.end
+            if place.opcode == Opcode.MESSAGE:
+                found, following = file.loose_messages(place, end)
+            elif place.opcode == Opcode.CHUNK:
+                found = file.chunk(place)
+        except BagError as error:
+            damaged(error)
+            start = _find_record(file, start + 1, end)
+            continue
+        yield found
+        start = following
+
+
+def add_schema(contents: Contents, schema: records.Schema, where: str) -> None:
+    """Add a schema, which may be there several times.
+
+    Raises:
+        BagError: There is another one with its id.
+    """
+    known = contents.schemas.setdefault(schema.id, schema)
+    if known != schema:
+        raise BagError(
+            f"{where}: schema {schema.id} is `{schema.name}` here, and another `{known.name}` elsewhere"
+        )
+
+
+def add_channel(contents: Contents, channel: records.Channel, where: str) -> None:
+    """Add a channel, which may be there several times.
+
+    Raises:
+        BagError: There is another one with its id.
+    """
+    known = contents.channels.setdefault(channel.id, channel)
+    if known != channel:
+        raise BagError(
+            f"{where}: channel {channel.id} is `{channel.topic}` here, and another `{known.topic}` elsewhere"
+        )
+
+
+def missing_schemas(contents: Contents, path: str) -> list[BagError]:
+    """Return an error for each channel whose schema is not in the file."""
+    return [
+        BagError(
+            f"{path}: channel {channel.id} (`{channel.topic}`) has schema {channel.schema_id}, which is not there"
+        )
+        for channel in contents.channels.values()
+        if channel.schema_id and channel.schema_id not in contents.schemas
+    ]
+
+
+def _add(contents: Contents, file: McapFile, place: Place) -> None:
+    """Add a record of the data section."""
+    if place.opcode == Opcode.SCHEMA:
+        add_schema(contents, file.record(records.Schema, place), file.where(place.start))
+    elif place.opcode == Opcode.CHANNEL:
+        add_channel(contents, file.record(records.Channel, place), file.where(place.start))
+    elif place.opcode == Opcode.METADATA:
+        contents.metadata.append(file.record(records.Metadata, place))
+    elif place.opcode == Opcode.ATTACHMENT:
+        contents.attachments.append(place)
+
+
+def _add_inside(contents: Contents, opcode: int, content: Buffer, where: str) -> None:
+    """Add a record that is inside a chunk."""
+    what = f"{where}: {opcode_name(opcode)} in the chunk"
+    if opcode == Opcode.SCHEMA:
+        add_schema(contents, parse(records.Schema, content, what), where)
+    elif opcode == Opcode.CHANNEL:
+        add_channel(contents, parse(records.Channel, content, what), where)
+
+
+def _indexed(file: McapFile, offset: int, opcode: Opcode, index: Place) -> Place:
+    """Return the record that an index in the summary points to."""
+    if offset < index.start:
+        place = file.place(offset, index.start)
+        if place.opcode == opcode:
+            return place
+    raise file.damaged(index, f"{opcode_name(opcode)} should be at byte {offset} and is not")
+
+
+def _complete(contents: Contents, statistics: records.Statistics) -> bool:
+    """Return whether a summary leaves nothing out.
+
+    rosbag2 counts only the channels that have messages, but repeats all of them.
+    """
+    return (
+        len(contents.schemas) >= statistics.schema_count
+        and len(contents.channels) >= statistics.channel_count
+        and len(contents.metadata) >= statistics.metadata_count
+        and len(contents.attachments) >= statistics.attachment_count
+        and (bool(statistics.channel_message_counts) or not statistics.message_count)
+        and contents.channels.keys() >= statistics.channel_message_counts.keys()
+    )
+
+
+def _find_record(file: McapFile, start: int, end: int) -> int:
+    """Return where the next chunk or message is, somewhere behind damage; `end` if there is none."""
+    while start < end:
+        piece_end = min(start + PIECE_SIZE, end)
+        for match in _CANDIDATE.finditer(file.read(start, piece_end)):
+            if _is_believable(file, start + match.start(), end):
+                return start + match.start()
+        start = piece_end if piece_end == end else piece_end - RECORD_HEAD.size
+    return end
+
+
+def _is_believable(file: McapFile, start: int, end: int) -> bool:
+    """Return whether a chunk begins at a place, or a message that other records follow."""
+    try:
+        for place in islice(file.places(start, end), _BELIEVABLE_RECORDS):
+            if place.opcode == Opcode.CHUNK:
+                return file.chunk(place).compression in COMPRESSIONS
+            if place.opcode not in tuple(Opcode):
+                return False
+    except BagError:
+        return False
+    return True

@@ -1,0 +1,199 @@
+"""Reads MCAP files (https://mcap.dev/spec): whole, without a summary, unfinished or damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import BinaryIO
+
+from mcap import records
+from mcap.opcode import Opcode
+
+from rosidl_adapter_proto.bags.mcap_contents import (
+    Contents,
+    add_channel,
+    add_schema,
+    find_end,
+    missing_schemas,
+    read_summary,
+    scan,
+    walk,
+)
+from rosidl_adapter_proto.bags.mcap_records import MAGIC, ChunkPlace, McapFile, Place
+from rosidl_adapter_proto.bags.mcap_topics import read_topics
+from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
+from rosidl_adapter_proto.errors import BagError
+
+_SALVAGE = "`--on-error skip` reads what is whole"
+
+
+class McapReader:
+    """One MCAP file, open for reading; see `StorageReader`.
+
+    The summary says which topics there are and how much to expect. The data itself is read from the front, record by
+    record, so that the order is that of the file, and nothing is missed that the summary does not know.
+
+    Args:
+        file: The file, which must be able to seek. It is closed with the reader.
+        path: The file, for people.
+        salvage: Read what can be read of a damaged file, and say in `warnings` what cannot.
+
+    Attributes:
+        profile: The profile of the file, such as `ros2`.
+
+    Raises:
+        BagError: The file is no MCAP file; or it is damaged, and not to be salvaged.
+    """
+
+    storage = "mcap"
+
+    def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
+        self.path = path
+        self.warnings: list[str] = []
+        self._file = McapFile(file, path)
+        self._salvage = salvage
+        self.profile = self._read_header().profile
+        contents = self._contents = self._read_contents()
+        for error in missing_schemas(contents, path):
+            self._damaged(error)
+        self.topics = read_topics(contents.channels, contents.schemas, contents.metadata)
+        self.statistics = contents.statistics
+        self.metadata = [(record.name, record.metadata) for record in contents.metadata]
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield the attachments of the file; see `StorageReader.attachments`."""
+        for place in self._contents.attachments:
+            try:
+                attachment = self._file.attachment(place)
+            except BagError as error:
+                self._damaged(error)
+            else:
+                yield attachment
+
+    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+        """Yield the chunks that may have messages of a selection; see `StorageReader.chunks`."""
+        chunk: StoredChunk | None = None
+        chunk_count = 0
+        message_counts: list[int | None] = []
+        for found in walk(self._file, self._file.size, self._damaged):
+            if isinstance(found, Place) and found.opcode == Opcode.MESSAGE_INDEX:
+                if message_counts:
+                    message_counts[-1] = (message_counts[-1] or 0) + (found.end - found.content - 6) // 16
+                continue
+            # The indexes of a chunk are behind it, and nothing is read twice.
+            if chunk is not None:
+                yield replace(chunk, message_count=message_counts[-1])
+                chunk = None
+            if isinstance(found, Place):
+                self._check(found)
+                continue
+            chunk_count += isinstance(found, ChunkPlace)
+            message_counts.append(found.message_count if isinstance(found, StoredChunk) else None)
+            if _in_time(found, selection) and self._has_topics(found, selection):
+                chunk = self._file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
+        if chunk is not None:
+            yield replace(chunk, message_count=message_counts[-1])
+        self._check_counts(chunk_count, message_counts)
+
+    def __enter__(self) -> McapReader:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._file.close()
+
+    def _read_header(self) -> records.Header:
+        if self._file.size < len(MAGIC) or self._file.read(0, len(MAGIC)) != MAGIC:
+            raise BagError(f"{self.path}: this is no MCAP file: it does not begin with the bytes of one")
+        try:
+            place = self._file.place(len(MAGIC), self._file.size)
+            return self._file.record(records.Header, place)
+        except BagError as error:
+            self._damaged(error)
+            return records.Header(profile="", library="")
+
+    def _read_contents(self) -> Contents:
+        """Return what the summary says, or else what the whole file says."""
+        end = find_end(self._file)
+        if end is None:
+            return self._scan("the recording was not finished: it has no end")
+        if end < self._file.size:
+            garbage = self._file.size - end
+            self._damaged(
+                BagError(f"{self._file.where(end)}: the recording ends here, and {garbage} bytes follow")
+            )
+            self._file.size = end
+        try:
+            contents = read_summary(self._file)
+        except BagError as error:
+            self._damaged(error)
+            return self._scan("the summary is not used")
+        return contents or self._scan("the summary is missing, or leaves something out")
+
+    def _scan(self, why: str) -> Contents:
+        """Return what is in the whole file; all damage is looked for before it is reported."""
+        damages: list[BagError] = []
+        contents = scan(self._file, damages.append)
+        count = contents.statistics.message_count
+        if damages and not self._salvage:
+            raise BagError(f"{damages[0]}; {count} messages are whole; {_SALVAGE}") from damages[0]
+        self.warnings.append(f"{self.path}: {why}; it was searched, and {count} messages were found")
+        for error in damages:
+            self._damaged(error)
+        return contents
+
+    def _damaged(self, error: BagError) -> None:
+        """Raise an error, unless what can be read is to be read."""
+        if not self._salvage:
+            raise BagError(f"{error}; {_SALVAGE}") from error
+        self._warn(str(error))
+
+    def _warn(self, warning: str) -> None:
+        if warning not in self.warnings:
+            self.warnings.append(warning)
+
+    def _check(self, place: Place) -> None:
+        """Compare a record of the data section with what is known of the file."""
+        where = self._file.where(place.start)
+        try:
+            if place.opcode == Opcode.SCHEMA:
+                add_schema(self._contents, self._file.record(records.Schema, place), where)
+            elif place.opcode == Opcode.CHANNEL:
+                channel = self._file.record(records.Channel, place)
+                add_channel(self._contents, channel, where)
+                if channel.id not in self.topics:
+                    raise BagError(f"{where}: channel {channel.id} (`{channel.topic}`) is not in the summary")
+            elif place.opcode not in tuple(Opcode):
+                self._warn(f"{where}: {place.name} is left out")
+        except BagError as error:
+            self._damaged(error)
+
+    def _check_counts(self, chunk_count: int, message_counts: list[int | None]) -> None:
+        """Compare the number of chunks, and of messages as far as their indexes say, with the summary."""
+        expected = self._contents.chunk_count
+        if expected is None:
+            return
+        if expected != chunk_count:
+            self._damaged(
+                BagError(f"{self.path}: the summary counts {expected} chunks, and there are {chunk_count}")
+            )
+        counts = [count for count in message_counts if count is not None]
+        message_count = self.statistics.message_count
+        if len(counts) == len(message_counts) and sum(counts) != message_count:
+            self._damaged(
+                BagError(
+                    f"{self.path}: the summary counts {message_count} messages, and there are {sum(counts)}"
+                )
+            )
+
+    def _has_topics(self, chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
+        """Return whether a chunk may have messages of the topics of a selection, as far as the summary says."""
+        if selection.topic_ids is None or isinstance(chunk, StoredChunk):
+            return True
+        topics = self._contents.chunk_topics.get(chunk.start)
+        return topics is None or not topics.isdisjoint(selection.topic_ids)
+
+
+def _in_time(chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
+    return chunk.end_time >= selection.start_time and (
+        selection.end_time is None or chunk.start_time < selection.end_time
+    )

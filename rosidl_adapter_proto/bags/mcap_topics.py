@@ -1,0 +1,146 @@
+"""How topics of ROS are written as channels and schemas of MCAP, and read from them.
+
+The profile `ros2` (https://mcap.dev/spec/registry#ros2) is for CDR alone. A file with protobuf has no profile; the ROS
+type of a channel, and ROS's definition of it, are kept beside the descriptors, for the way back.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import yaml
+from mcap.records import Channel, Metadata, Schema
+
+from rosidl_adapter_proto.bags.model import CDR, ROS1, RecordedDefinition, Topic
+
+QOS_PROFILES = "offered_qos_profiles"
+TYPE_HASH = "topic_type_hash"
+ROS_TYPE = "ros_type"
+ROSBAG2 = "rosbag2"
+ROS_DEFINITIONS = "rosidl_adapter_proto.ros_definitions"
+"""The metadata record with ROS's definitions: by the name of the type, its encoding, a newline, and the text."""
+
+_PROTOBUF_NAME = re.compile(r"(?P<package>\w+)\.(?P<kind>msg|srv|action)\.pb\.(?P<name>\w+)", re.ASCII)
+_ROS_NAME = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
+
+
+def read_topics(
+    channels: Mapping[int, Channel], schemas: Mapping[int, Schema], metadata: Sequence[Metadata]
+) -> dict[int, Topic]:
+    """Return the topics of a file, by the ids of their channels.
+
+    Args:
+        channels: All channels, by their ids.
+        schemas: All schemas, by their ids; a channel may be without.
+        metadata: All metadata records, in the order of the file.
+    """
+    topics = {
+        topic_id: _read_topic(channel, schemas.get(channel.schema_id))
+        for topic_id, channel in channels.items()
+    }
+    if not all(topic.type_name for topic in topics.values()):
+        types = _rosbag2_types(metadata)
+        topics = {
+            topic_id: topic if topic.type_name else replace(topic, type_name=types.get(topic.name, ""))
+            for topic_id, topic in topics.items()
+        }
+    definitions = _ros_definitions(metadata)
+    return {
+        topic_id: (
+            replace(topic, ros_definition=definitions[topic.type_name])
+            if topic.serialization_format != CDR and topic.type_name in definitions
+            else topic
+        )
+        for topic_id, topic in topics.items()
+    }
+
+
+def write_schema(topic: Topic) -> Schema:
+    """Return the schema of a topic, whose id is still 0."""
+    name = topic.type_name if topic.serialization_format == CDR else topic.schema_name or topic.type_name
+    return Schema(id=0, name=name, encoding=topic.definition.encoding, data=topic.definition.data)
+
+
+def write_channel(topic: Topic, topic_id: int, schema_id: int) -> Channel:
+    """Return the channel of a topic."""
+    metadata = {QOS_PROFILES: topic.qos_profiles, TYPE_HASH: topic.type_hash}
+    if topic.serialization_format != CDR:
+        metadata[ROS_TYPE] = topic.type_name
+    metadata = {name: value for name, value in metadata.items() if value}
+    return Channel(
+        id=topic_id,
+        topic=topic.name,
+        message_encoding=topic.serialization_format,
+        metadata={**metadata, **topic.metadata},
+        schema_id=schema_id,
+    )
+
+
+def write_ros_definition(definition: RecordedDefinition) -> str:
+    """Return ROS's definition of a type as a value of the metadata record."""
+    try:
+        text = definition.data.decode()
+    except UnicodeDecodeError:
+        # Comments of old packages; every byte is some letter of Latin 1.
+        text = definition.data.decode("latin-1")
+    return f"{definition.encoding}\n{text}"
+
+
+def _ros_name(serialization_format: str, schema_name: str) -> str:
+    """Return the ROS type that the name of a schema says; empty if it says none."""
+    if serialization_format == CDR:
+        return schema_name
+    if serialization_format == ROS1:
+        return "/msg/".join(schema_name.split("/")) if schema_name.count("/") == 1 else schema_name
+    if match := _PROTOBUF_NAME.fullmatch(schema_name):
+        return f"{match['package']}/{match['kind']}/{match['name']}"
+    return schema_name if _ROS_NAME.fullmatch(schema_name) else ""
+
+
+def _read_topic(channel: Channel, schema: Schema | None) -> Topic:
+    """Return what a channel and its schema alone say of a topic."""
+    rest = dict(channel.metadata)
+    qos_profiles, type_hash = rest.pop(QOS_PROFILES, ""), rest.pop(TYPE_HASH, "")
+    said = rest.pop(ROS_TYPE, "")
+    schema_name = schema.name if schema else ""
+    return Topic(
+        name=channel.topic,
+        type_name=said or _ros_name(channel.message_encoding, schema_name),
+        serialization_format=channel.message_encoding,
+        definition=RecordedDefinition(schema.encoding, schema.data) if schema else RecordedDefinition(),
+        schema_name=schema_name,
+        type_hash=type_hash,
+        qos_profiles=qos_profiles,
+        metadata=rest,
+    )
+
+
+def _ros_definitions(metadata: Iterable[Metadata]) -> dict[str, RecordedDefinition]:
+    """Return ROS's definitions by the names of the types."""
+    definitions = {}
+    for record in metadata:
+        if record.name == ROS_DEFINITIONS:
+            for type_name, value in record.metadata.items():
+                encoding, _, text = value.partition("\n")
+                definitions[type_name] = RecordedDefinition(encoding, text.encode())
+    return definitions
+
+
+def _rosbag2_types(metadata: Iterable[Metadata]) -> dict[str, str]:
+    """Return the types by the names of the topics, as rosbag2's own description has them; the last one counts."""
+    descriptions = [record for record in metadata if record.name == ROSBAG2]
+    if not descriptions:
+        return {}
+    try:
+        description = yaml.safe_load(descriptions[-1].metadata.get("serialized_metadata", ""))
+    except (yaml.YAMLError, RecursionError, ValueError):
+        return {}  # a topic without a type can be copied, and whoever needs the type says that it is missing
+    listed = description.get("topics_with_message_count") if isinstance(description, dict) else None
+    entries = [entry.get("topic_metadata") for entry in listed or () if isinstance(entry, dict)]
+    return {
+        str(entry["name"]): str(entry.get("type", ""))
+        for entry in entries
+        if isinstance(entry, dict) and "name" in entry
+    }

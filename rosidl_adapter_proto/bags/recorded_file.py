@@ -1,0 +1,256 @@
+"""The files of a recording: recognized by their first bytes, decompressed and opened, with what metadata.yaml adds.
+
+rosbag2 may have compressed whole files (compression mode `FILE`) or each message (`MESSAGE`), always with zstd.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import zstandard
+
+from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.mcap_reader import McapReader
+from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
+from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.sqlite3_storage import SqliteReader
+from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader
+from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.records import Records, pack_records, read_records
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+MCAP = "mcap"
+SQLITE3 = "sqlite3"
+ROSBAG = "rosbag_v2"
+SUFFIXES: Mapping[str, str] = {".mcap": MCAP, ".db3": SQLITE3, ".bag": ROSBAG}
+ZSTD_SUFFIX = ".zstd"
+
+_MAGICS = {b"\x89MCAP0\r\n": MCAP, b"SQLite format 3\0": SQLITE3, b"#ROSBAG V": ROSBAG}
+_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_SPARE_SPACE = 2**26  # bytes that stay free on the disk of temporary files
+_PIECE_SIZE = 2**20  # bytes of decompressed messages in a chunk, about
+_SHARED_FIELDS = {
+    "type_name": "type",
+    "serialization_format": "serialization format",
+    "type_hash": "type hash",
+    "qos_profiles": "QoS",
+}
+
+
+@dataclass(frozen=True)
+class RecordedFile:
+    """A file of a recording.
+
+    Attributes:
+        path: Where it is.
+        storage: The name of its storage in rosbag2: `mcap`, `sqlite3` or `rosbag_v2`.
+        compressed: Whether it is compressed as a whole.
+    """
+
+    path: str
+    storage: str
+    compressed: bool
+
+
+def recognize(path: str) -> RecordedFile:
+    """Return what a file is, whatever its name.
+
+    Raises:
+        BagError: It cannot be read, or is no file of a bag.
+    """
+    with open_file(path) as file:
+        head = file.read(16)
+        compressed = head.startswith(_ZSTD_MAGIC)
+        if compressed:
+            file.seek(0)
+            try:
+                head = zstandard.ZstdDecompressor().stream_reader(file).read(16)
+            except zstandard.ZstdError as error:
+                raise BagError(f"{path}: damaged zstd: {error}") from None
+    for magic, storage in _MAGICS.items():
+        if head.startswith(magic):
+            return RecordedFile(path, storage, compressed)
+    if not head:
+        raise BagError(f"{path}: empty")
+    raise BagError(f"{path}: neither MCAP nor sqlite3 nor a ROS 1 bag: it begins with {head.hex(' ')}")
+
+
+def open_file(path: str) -> BinaryIO:
+    """Open a file of a recording.
+
+    Raises:
+        BagError: It cannot be opened.
+    """
+    try:
+        return open(path, "rb")
+    except OSError as error:
+        raise BagError(f"{path}: {error.strerror}") from None
+
+
+def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool = False) -> StorageReader:
+    """Open a file for reading, from a temporary copy if it is compressed.
+
+    Args:
+        file: The file.
+        metadata: What metadata.yaml says about the recording.
+        salvage: Read what can be read of a damaged file.
+
+    Raises:
+        BagError: It cannot be read.
+    """
+    with ExitStack() as stack:
+        path = _decompressed(file.path, stack) if file.compressed else file.path
+        reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage))
+        return _OpenedFile(reader, metadata, stack)
+
+
+def _decompressed(path: str, stack: ExitStack) -> str:
+    """Return a temporary file with what another has compressed."""
+    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-"))
+    target = Path(folder, Path(path).name.removesuffix(ZSTD_SUFFIX))
+    room = shutil.disk_usage(folder).free - _SPARE_SPACE
+    with open_file(path) as source, target.open("wb") as file:
+        try:
+            for piece in zstandard.ZstdDecompressor().read_to_iter(source):
+                room -= len(piece)
+                if room < 0:
+                    raise BagError(
+                        f"{path}: too large to be decompressed in {folder}; set TMPDIR to a larger disk"
+                    )
+                file.write(piece)
+        except zstandard.ZstdError as error:
+            raise BagError(f"{path}: damaged zstd, after {file.tell()} bytes: {error}") from None
+    return str(target)
+
+
+def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
+    return McapReader(open_file(path), name, salvage=salvage)
+
+
+def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
+    return SqliteReader(path, name, salvage=salvage)
+
+
+_OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
+    MCAP: _open_mcap,
+    SQLITE3: _open_sqlite3,
+}
+
+
+class _OpenedFile:
+    """A file of a recording, with what only metadata.yaml says of its topics; see `StorageReader`."""
+
+    def __init__(self, reader: StorageReader, metadata: BagMetadata | None, stack: ExitStack) -> None:
+        self.path = reader.path
+        self.storage = reader.storage
+        self.metadata: Sequence[tuple[str, Mapping[str, str]]] = reader.metadata
+        self.topics, self._contradictions = _with_metadata(reader, metadata)
+        metadata = metadata or _inner_metadata(reader)
+        self._messages_compressed = metadata is not None and metadata.compression_mode == "MESSAGE"
+        if metadata is not None and self._messages_compressed and metadata.compression_format != "zstd":
+            known = f"compressed with {metadata.compression_format!r}; only zstd is known"
+            raise BagError(f"{self.path}: its messages are {known}")
+        self._reader = reader
+        self._stack = stack.pop_all()
+
+    @property
+    def statistics(self) -> Statistics:
+        return self._reader.statistics
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        return [*self._reader.warnings, *self._contradictions]
+
+    def attachments(self) -> Iterator[Attachment]:
+        return self._reader.attachments()
+
+    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+        for chunk in self._reader.chunks(selection):
+            if self._messages_compressed:
+                yield from _with_plain_messages(chunk, selection)
+            else:
+                yield chunk
+
+    def __enter__(self) -> _OpenedFile:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stack.close()
+
+
+def _inner_metadata(reader: StorageReader) -> BagMetadata | None:
+    """Return what rosbag2 wrote into a file about its bag; the last one counts."""
+    texts = [
+        values["serialized_metadata"] for _, values in reader.metadata if "serialized_metadata" in values
+    ]
+    return read_metadata(texts[-1].encode(), f"{reader.path}, the metadata in it") if texts else None
+
+
+def _with_metadata(
+    reader: StorageReader, metadata: BagMetadata | None
+) -> tuple[Mapping[int, Topic], list[str]]:
+    """Return the topics of a file with what only metadata.yaml says of them, and what the two say differently."""
+    listed = (
+        {information.topic.name: information.topic for information in metadata.topics} if metadata else {}
+    )
+    topics: dict[int, Topic] = {}
+    contradictions: list[str] = []
+    for topic_id, topic in reader.topics.items():
+        values = {
+            name: (getattr(topic, name), getattr(listed.get(topic.name, topic), name))
+            for name in _SHARED_FIELDS
+        }
+        topics[topic_id] = replace(topic, **{name: own or other for name, (own, other) in values.items()})
+        differing = [
+            _SHARED_FIELDS[name] for name, (own, other) in values.items() if own and other and own != other
+        ]
+        if differing:
+            names = " and ".join(differing)
+            contradictions.append(
+                f"{reader.path}: {topic.name}: {METADATA_FILE} has another {names}; the file counts"
+            )
+    return topics, contradictions
+
+
+def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[StoredChunk]:
+    """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
+    records = read_records(records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time)
+    first = 0
+    size = 0
+    messages: list[Buffer] = []
+    for index in range(len(records)):
+        messages.append(_decompressed_message(records, index, chunk.where))
+        size += memoryview(messages[-1]).nbytes
+        if size >= _PIECE_SIZE or index == len(records) - 1:
+            yield _plain_chunk(records, first, messages, chunk.where)
+            first, size, messages = index + 1, 0, []
+
+
+def _decompressed_message(records: Records, index: int, where: str) -> bytes:
+    data = records[index]
+    try:
+        size = zstandard.frame_content_size(data)
+        if not 0 <= size <= MAXIMUM_CHUNK_SIZE:
+            raise zstandard.ZstdError(f"its size would be {size} bytes")
+        plain: bytes = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
+    except zstandard.ZstdError as error:
+        raise BagError(f"{where}: message {index} of the chunk: cannot be decompressed: {error}") from None
+    return plain
+
+
+def _plain_chunk(records: Records, first: int, messages: list[Buffer], where: str) -> StoredChunk:
+    chosen = slice(first, first + len(messages))
+    times = array("Q", records.log_times[chosen])
+    data = pack_records(
+        records.topic_ids[chosen], records.sequences[chosen], times, records.publish_times[chosen], messages
+    )
+    return StoredChunk(where, data, "", len(data), 0, min(times), max(times), len(messages))

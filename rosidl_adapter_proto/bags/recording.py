@@ -1,0 +1,152 @@
+"""Recordings: the files of a bag, in their order.
+
+A recording is a folder of rosbag2, whose metadata.yaml names its files, or a single file: MCAP, sqlite3 (`.db3`) or a
+ROS 1 bag.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
+from rosidl_adapter_proto.bags.recorded_file import (
+    SUFFIXES,
+    ZSTD_SUFFIX,
+    RecordedFile,
+    open_reader,
+    recognize,
+)
+from rosidl_adapter_proto.bags.storage import StorageReader
+from rosidl_adapter_proto.errors import BagError
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A bag: its files, and what metadata.yaml says.
+
+    Attributes:
+        path: The folder, or the single file.
+        files: The files, in the order in which they were recorded; at least one.
+        metadata: What metadata.yaml says, about all files of the folder; None without one.
+        warnings: What is odd about the recording as a whole, for people.
+    """
+
+    path: str
+    files: tuple[RecordedFile, ...]
+    metadata: BagMetadata | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def storage(self) -> str:
+        """The storage of its first file, by its name in rosbag2."""
+        return self.files[0].storage
+
+    def open(self, index: int, salvage: bool = False) -> StorageReader:
+        """Open a file.
+
+        Args:
+            index: Which of `files`.
+            salvage: Read what can be read of a damaged file.
+
+        Raises:
+            BagError: It cannot be read.
+        """
+        return open_reader(self.files[index], self.metadata, salvage)
+
+    def readers(self, salvage: bool = False) -> Iterator[StorageReader]:
+        """Yield a reader of each file in turn, which is closed when the next is asked for."""
+        for index in range(len(self.files)):
+            with self.open(index, salvage) as reader:
+                yield reader
+
+
+def find_recording(path: str) -> Recording:
+    """Return the recording at a path.
+
+    Args:
+        path: A folder of rosbag2, a file of one, or a ROS 1 bag.
+
+    Raises:
+        BagError: There is none, or a file of it is missing.
+    """
+    place = Path(path)
+    if place.is_dir():
+        return _folder(place)
+    if not place.exists():
+        raise BagError(f"{path}: no such file or folder")
+    file = recognize(path)
+    metadata, warnings = _metadata_beside(place)
+    return Recording(path, (file,), metadata, warnings)
+
+
+def _folder(folder: Path) -> Recording:
+    place = folder / METADATA_FILE
+    present = sorted(
+        path for path in folder.iterdir() if Path(_plain_name(path)).suffix in SUFFIXES and path.is_file()
+    )
+    metadata = read_metadata(place.read_bytes(), str(place)) if place.is_file() else None
+    if metadata is not None and metadata.paths:
+        return _listed_files(folder, metadata, present)
+    if not present:
+        raise BagError(
+            f"{folder}: no {METADATA_FILE} that names files, and no {', '.join(SUFFIXES)} files in it"
+        )
+    files = _by_start_time([recognize(str(path)) for path in present])
+    names = ", ".join(Path(file.path).name for file in files)
+    reason = f"no {METADATA_FILE}" if metadata is None else f"{METADATA_FILE} names no files"
+    warning = f"{folder}: {reason}; the files found, in the order of their first messages: {names}"
+    return Recording(str(folder), tuple(files), metadata, (warning,))
+
+
+def _listed_files(folder: Path, metadata: BagMetadata, present: list[Path]) -> Recording:
+    paths = [_listed_file(folder, name) for name in metadata.paths]
+    files = tuple(recognize(str(path)) for path in paths)
+    warnings: list[str] = []
+    listed = {_plain_name(path) for path in paths}
+    others = ", ".join(path.name for path in present if _plain_name(path) not in listed)
+    if others:
+        warnings.append(f"{folder}: {METADATA_FILE} does not name {others}, which is left out")
+    storages = {file.storage for file in files} - {metadata.storage}
+    if storages:
+        warnings.append(
+            f"{folder}: {METADATA_FILE} says {metadata.storage}, but there is {', '.join(sorted(storages))}"
+        )
+    return Recording(str(folder), files, metadata, tuple(warnings))
+
+
+def _listed_file(folder: Path, name: str) -> Path:
+    """Return a file that metadata.yaml names; rosbag2 leaves it compressed or decompressed when it is interrupted."""
+    path = folder / name
+    for candidate in (path, Path(f"{path}{ZSTD_SUFFIX}"), path.with_name(_plain_name(path))):
+        if candidate.is_file():
+            return candidate
+    raise BagError(
+        f"{folder / METADATA_FILE}: names {name}, which is missing; name a file that is there instead"
+    )
+
+
+def _plain_name(path: Path) -> str:
+    return path.name.removesuffix(ZSTD_SUFFIX)
+
+
+def _by_start_time(files: list[RecordedFile]) -> list[RecordedFile]:
+    times: dict[str, tuple[bool, int]] = {}
+    for file in files:
+        with open_reader(file, None) as reader:
+            times[file.path] = not reader.statistics.message_count, reader.statistics.start_time
+    return sorted(files, key=lambda file: times[file.path])  # empty files come last
+
+
+def _metadata_beside(path: Path) -> tuple[BagMetadata | None, tuple[str, ...]]:
+    """Return the metadata in the folder of a file, if it is about that file."""
+    place = path.parent / METADATA_FILE
+    if not place.is_file():
+        return None, ()
+    try:
+        metadata = read_metadata(place.read_bytes(), str(place))
+    except BagError as error:
+        return None, (f"{error} (read without it)",)
+    names = {_plain_name(Path(name)) for name in metadata.paths}
+    return (metadata if _plain_name(path) in names else None), ()

@@ -1,0 +1,310 @@
+"""The sqlite3 storage of rosbag2, reading: `.db3` files of schemas 1 to 4.
+
+Schema 1 has the tables `topics` and `messages`; 2 adds QoS profiles, 3 the tables `schema` and `metadata`, 4 message
+definitions and type hashes (`rosbag2_storage_sqlite3/sqlite_storage.cpp`). Which columns there are is looked up, since
+files in the wild mix them. Protobuf bags have a table of our own, `protobuf_descriptors`.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import tempfile
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from rosidl_adapter_proto.bags.model import (
+    EVERYTHING,
+    PROTOBUF,
+    Attachment,
+    RecordedDefinition,
+    Selection,
+    Statistics,
+    StoredChunk,
+    Topic,
+)
+from rosidl_adapter_proto.bags.qos import numbered_qos
+from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.records import pack_records
+
+CHUNK_SIZE = 2**20
+"""About how many bytes of messages make a chunk."""
+
+MAXIMUM_TOPIC_ID = 2**16 - 1
+_LAST_ROW = 2**63 - 1
+_ENCODINGS = ("ros2msg", "ros2idl")
+
+
+class SqliteReader:
+    """A `.db3` file, open for reading; see `StorageReader`. The file is never changed.
+
+    Args:
+        file_path: The file.
+        path: What to call it, for people, if that is another name.
+        salvage: Read on after damaged pages, and say so in `warnings`, instead of raising an error.
+
+    Raises:
+        BagError: It is no sqlite3 database, or none of rosbag2.
+    """
+
+    storage = "sqlite3"
+
+    def __init__(self, file_path: str, path: str = "", *, salvage: bool = False) -> None:
+        self.path = path = path or file_path
+        self.warnings: list[str] = []
+        self._salvage = salvage
+        with ExitStack() as stack:
+            self._connection = self._open(Path(file_path), stack)
+            self._columns = {table: self._column_names(table) for table in self._tables()}
+            if not {"topics", "messages"} <= self._columns.keys():
+                raise BagError(
+                    f"{path}: a sqlite3 database, but no bag: it has no tables topics and messages"
+                )
+            self._rows_of_topics, self.topics = self._read_topics()
+            self.metadata = self._read_metadata()
+            self._stack = stack.pop_all()
+
+    def __enter__(self) -> SqliteReader:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._stack.close()
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """What is in the file, counted: a database does not keep it."""
+        ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
+        counts = dict.fromkeys(ids.values(), 0)
+        times: list[int] = []
+        query = "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id"
+        for row, count, first, last in self._query(query):
+            if row not in ids:
+                raise BagError(
+                    f"{self.path}: table messages: {count} messages have topic {row!r}, which is not listed"
+                )
+            counts[ids[row]] = count
+            times += [time for time in (first, last) if isinstance(time, int)]
+        return Statistics(counts, min(times, default=0), max(times, default=0))
+
+    def attachments(self) -> Iterator[Attachment]:
+        """Yield nothing: a database has no room for them."""
+        return iter(())
+
+    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+        """Yield the messages of a selection, in the order of the table, as chunks of about `CHUNK_SIZE` bytes.
+
+        Raises:
+            BagError: A row is not what it should be, or the database is damaged; the message says where.
+        """
+        query, values = self._selecting(selection)
+        ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
+        done = 0
+        for rows in self._batches(query, values):
+            yield self._chunk(rows, ids, done)
+            done += len(rows)
+
+    def _open(self, path: Path, stack: ExitStack) -> sqlite3.Connection:
+        if not path.is_file():
+            raise BagError(f"{self.path}: no such file")
+        # Nobody writes to it: so sqlite makes no files beside it, as it would otherwise in journal mode WAL.
+        place = f"file:{quote(str(self._recovered(path, stack).absolute()))}?mode=ro&immutable=1"
+        connection = sqlite3.connect(place, uri=True, check_same_thread=False)
+        stack.callback(connection.close)
+        connection.text_factory = bytes  # names may be anything; they are decoded with errors that say where
+        return connection
+
+    def _recovered(self, path: Path, stack: ExitStack) -> Path:
+        """Return the file, or a copy that has what its recorder, which was killed, had not yet written into it."""
+        beside = [Path(f"{path}{suffix}") for suffix in ("-wal", "-journal")]
+        journals = [journal for journal in beside if journal.is_file() and journal.stat().st_size]
+        if not journals:
+            return path
+        names = " and ".join(journal.name for journal in journals)
+        self.warnings.append(
+            f"{self.path}: its recorder did not finish; {names} beside it was read too, from a copy"
+        )
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-")))
+        for source in (path, *journals):
+            shutil.copyfile(source, folder / source.name)
+        connection = sqlite3.connect(folder / path.name)
+        try:
+            connection.execute(
+                "PRAGMA journal_mode = DELETE"
+            ).fetchall()  # sqlite takes in what lies beside it
+        except sqlite3.Error as error:
+            raise BagError(f"{self.path}: {_reason(error)}") from None
+        finally:
+            connection.close()
+        return folder / path.name
+
+    def _query(self, query: str, values: Sequence[object] = ()) -> Iterator[tuple[Any, ...]]:
+        try:
+            yield from self._connection.execute(query, values)
+        except sqlite3.Error as error:
+            raise BagError(f"{self.path}: {_reason(error)}") from None
+
+    def _tables(self) -> list[str]:
+        names = [name for (name,) in self._query("SELECT name FROM sqlite_master WHERE type = 'table'")]
+        return [name.decode(errors="replace") for name in names if name and b'"' not in name]
+
+    def _column_names(self, table: str) -> list[str]:
+        return [row[1].decode(errors="replace") for row in self._query(f'PRAGMA table_info("{table}")')]
+
+    def _texts(self, table: str, *columns: str) -> Iterator[tuple[Any, ...]]:
+        """Yield the ids and some columns of a table; columns that this schema has not are empty."""
+        present = self._columns.get(table, [])
+        if not present:
+            return
+        chosen = ", ".join(name if name in present else "''" for name in columns)
+        for row, *values in self._query(f"SELECT rowid, {chosen} FROM {table} ORDER BY rowid"):
+            yield row, *(
+                self._text(value, table, row, name) for name, value in zip(columns, values, strict=True)
+            )
+
+    def _text(self, value: object, table: str, row: int, column: str) -> str:
+        where = f"{self.path}: table {table}, row {row}, {column}"
+        if not isinstance(value, bytes):
+            raise BagError(f"{where}: expected a text, not {value!r}")
+        try:
+            return value.decode()
+        except UnicodeDecodeError as error:
+            raise BagError(f"{where}: not UTF-8 at byte {error.start}") from None
+
+    def _read_topics(self) -> tuple[dict[int, int], Mapping[int, Topic]]:
+        columns = ("name", "type", "serialization_format", "offered_qos_profiles", "type_description_hash")
+        rows = list(self._texts("topics", *columns))
+        if len(rows) > MAXIMUM_TOPIC_ID:
+            raise BagError(
+                f"{self.path}: {len(rows)} topics; at most {MAXIMUM_TOPIC_ID} are possible in a file"
+            )
+        # A chunk has 16 bits for a topic; the table has 64.
+        fitting = all(0 < row[0] <= MAXIMUM_TOPIC_ID for row in rows)
+        rows_of_topics = {row[0] if fitting else number: row[0] for number, row in enumerate(rows, start=1)}
+        definitions = self._definitions()
+        descriptors = self._descriptors()
+        topics = {
+            topic_id: _topic(row[1:], definitions, descriptors)
+            for topic_id, row in zip(rows_of_topics, rows, strict=True)
+        }
+        return rows_of_topics, topics
+
+    def _definitions(self) -> dict[str, RecordedDefinition]:
+        rows = self._texts("message_definitions", "topic_type", "encoding", "encoded_message_definition")
+        return {
+            type_name: RecordedDefinition(encoding, text.encode())
+            for _, type_name, encoding, text in rows
+            if encoding in _ENCODINGS  # rosbag2 writes `unknown` for a type whose definition it did not find
+        }
+
+    def _descriptors(self) -> dict[str, tuple[str, RecordedDefinition]]:
+        rows = self._texts("protobuf_descriptors", "topic_type", "full_name")
+        names = {row: (type_name, full_name) for row, type_name, full_name in rows}
+        if not names:
+            return {}
+        found: dict[str, tuple[str, RecordedDefinition]] = {}
+        for row, data in self._query("SELECT rowid, descriptor_set FROM protobuf_descriptors"):
+            if not isinstance(data, bytes):
+                raise BagError(
+                    f"{self.path}: table protobuf_descriptors, row {row}: expected bytes, not {data!r}"
+                )
+            type_name, full_name = names[row]
+            found[type_name] = full_name, RecordedDefinition(PROTOBUF, data)
+        return found
+
+    def _read_metadata(self) -> list[tuple[str, Mapping[str, str]]]:
+        """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
+        return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
+
+    def _selecting(self, selection: Selection) -> tuple[str, list[int]]:
+        """Return the query for the messages of a selection that come after a row and up to another, and its values."""
+        conditions = ["id > ?", "id <= ?"]
+        values: list[int] = []
+        if selection.topic_ids is not None:
+            rows = [
+                self._rows_of_topics[topic] for topic in selection.topic_ids if topic in self._rows_of_topics
+            ]
+            conditions.append(f"topic_id IN ({', '.join(map(str, rows))})")
+        # The plus keeps sqlite from sorting whole messages by the index of times.
+        if selection.start_time:
+            conditions.append("+timestamp >= ?")
+            values.append(min(selection.start_time, _LAST_ROW))
+        if selection.end_time is not None:
+            conditions.append("+timestamp < ?")
+            values.append(min(selection.end_time, _LAST_ROW))
+        return (
+            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id",
+            values,
+        )
+
+    def _batches(self, query: str, values: list[int]) -> Iterator[list[tuple[Any, ...]]]:
+        rows: list[tuple[Any, ...]] = []
+        size = 0
+        for row in self._query(query, [-_LAST_ROW - 1, _LAST_ROW, *values]):
+            rows.append(row)
+            size += 64 + (len(row[3]) if isinstance(row[3], bytes) else 0)
+            if size >= CHUNK_SIZE:
+                yield rows
+                rows = []
+                size = 0
+        if rows:
+            yield rows
+
+    def _chunk(self, rows: list[tuple[Any, ...]], ids: Mapping[int, int], done: int) -> StoredChunk:
+        where = f"{self.path}, table messages, rows {rows[0][0]} to {rows[-1][0]}"
+        _, topics, times, messages = zip(*rows, strict=True)
+        try:
+            log_times = array("Q", times)
+            topic_ids = array("H", [ids[topic] for topic in topics])
+            data = pack_records(topic_ids, array("I", bytes(4 * len(rows))), log_times, log_times, messages)
+        except (TypeError, OverflowError, KeyError):
+            raise self._wrong_row(rows, ids, done) from None
+        return StoredChunk(where, data, "", len(data), 0, min(log_times), max(log_times), len(rows))
+
+    def _wrong_row(self, rows: list[tuple[Any, ...]], ids: Mapping[int, int], done: int) -> BagError:
+        for number, (row, topic, time, data) in enumerate(rows):
+            reason = ""
+            if topic not in ids:
+                reason = f"topic_id {topic!r} is not in the table topics"
+            elif not isinstance(time, int) or time < 0:
+                reason = f"timestamp {time!r} is not a time in nanoseconds since 1970"
+            elif not isinstance(data, bytes):
+                reason = f"data is {'missing' if data is None else repr(data)}, not bytes"
+            if reason:
+                read = f"{done + number} messages before it were read"
+                return BagError(f"{self.path}: table messages, row {row}: {reason}; {read}")
+        raise AssertionError("a row that cannot be packed is wrong")
+
+
+def _topic(
+    values: tuple[str, ...],
+    definitions: Mapping[str, RecordedDefinition],
+    descriptors: Mapping[str, tuple[str, RecordedDefinition]],
+) -> Topic:
+    name, type_name, serialization_format, qos_profiles, type_hash = values
+    # The definition of a service event is that of its service, by the service's name.
+    definition = definitions.get(type_name) or definitions.get(
+        type_name.removesuffix("_Event"), RecordedDefinition()
+    )
+    schema_name, descriptor = descriptors.get(type_name, ("", RecordedDefinition()))
+    protobuf = serialization_format == PROTOBUF
+    return Topic(
+        name=name,
+        type_name=type_name,
+        serialization_format=serialization_format,
+        definition=descriptor if protobuf else definition,
+        ros_definition=definition if protobuf else RecordedDefinition(),
+        schema_name=schema_name if protobuf else type_name,
+        type_hash=type_hash,
+        qos_profiles=numbered_qos(qos_profiles),
+    )
+
+
+def _reason(error: sqlite3.Error) -> str:
+    if isinstance(error, sqlite3.DatabaseError) and "not a database" in str(error):
+        return "no sqlite3 database"
+    return f"sqlite3 says: {error}"
