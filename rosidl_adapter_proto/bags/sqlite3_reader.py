@@ -36,8 +36,10 @@ CHUNK_SIZE = 2**20
 """About how many bytes of messages make a chunk."""
 
 MAXIMUM_TOPIC_ID = 2**16 - 1
-_LAST_ROW = 2**63 - 1
-_ENCODINGS = ("ros2msg", "ros2idl")
+_ROW_SIZE = 64  # bytes of a row beside its message, about
+_FIRST_ROW, _LAST_ROW = -(2**63) + 1, 2**63 - 1
+_DEFINITIONS = "message_definitions"
+_DESCRIPTORS = "protobuf_descriptors"
 
 
 class SqliteReader:
@@ -65,7 +67,7 @@ class SqliteReader:
                 raise BagError(
                     f"{path}: a sqlite3 database, but no bag: it has no tables topics and messages"
                 )
-            self._rows_of_topics, self.topics = self._read_topics()
+            self._topic_ids, self.topics = self._read_topics()
             self.metadata = self._read_metadata()
             self._stack = stack.pop_all()
 
@@ -78,17 +80,19 @@ class SqliteReader:
     @cached_property
     def statistics(self) -> Statistics:
         """What is in the file, counted: a database does not keep it."""
-        ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
-        counts = dict.fromkeys(ids.values(), 0)
-        times: list[int] = []
         query = "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id"
-        for row, count, first, last in self._query(query):
-            if row not in ids:
-                raise BagError(
-                    f"{self.path}: table messages: {count} messages have topic {row!r}, which is not listed"
-                )
-            counts[ids[row]] = count
-            times += [time for time in (first, last) if isinstance(time, int)]
+        try:
+            groups = list(self._query(query))
+        except BagError:
+            if not self._salvage:
+                raise
+            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(*self._selecting(EVERYTHING))]
+        counts = dict.fromkeys(self.topics, 0)
+        for topic, count, _, _ in groups:
+            if topic not in self._topic_ids:
+                raise BagError(f"{self.path}: table messages: topic_id {topic!r} is not in the table topics")
+            counts[self._topic_ids[topic]] += count
+        times = [time for group in groups for time in group[2:] if isinstance(time, int)]
         return Statistics(counts, min(times, default=0), max(times, default=0))
 
     def attachments(self) -> Iterator[Attachment]:
@@ -101,12 +105,18 @@ class SqliteReader:
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
-        query, values = self._selecting(selection)
-        ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
-        done = 0
-        for rows in self._batches(query, values):
-            yield self._chunk(rows, ids, done)
-            done += len(rows)
+        rows: list[tuple[Any, ...]] = []
+        size = done = 0
+        for row in self._messages(*self._selecting(selection)):
+            rows.append(row)
+            size += _ROW_SIZE + (len(row[3]) if isinstance(row[3], bytes) else 0)
+            if size >= CHUNK_SIZE:
+                yield self._chunk(rows, done)
+                done += len(rows)
+                rows = []
+                size = 0
+        if rows:
+            yield self._chunk(rows, done)
 
     def _open(self, path: Path, stack: ExitStack) -> sqlite3.Connection:
         if not path.is_file():
@@ -175,6 +185,11 @@ class SqliteReader:
         except UnicodeDecodeError as error:
             raise BagError(f"{where}: not UTF-8 at byte {error.start}") from None
 
+    def _bytes(self, value: object, table: str, row: int) -> bytes:
+        if not isinstance(value, bytes):
+            raise BagError(f"{self.path}: table {table}, row {row}: expected bytes, not {value!r}")
+        return value
+
     def _read_topics(self) -> tuple[dict[int, int], Mapping[int, Topic]]:
         columns = ("name", "type", "serialization_format", "offered_qos_profiles", "type_description_hash")
         rows = list(self._texts("topics", *columns))
@@ -182,93 +197,124 @@ class SqliteReader:
             raise BagError(
                 f"{self.path}: {len(rows)} topics; at most {MAXIMUM_TOPIC_ID} are possible in a file"
             )
-        # A chunk has 16 bits for a topic; the table has 64.
+        # A chunk has 16 bits for it; the table has 64.
         fitting = all(0 < row[0] <= MAXIMUM_TOPIC_ID for row in rows)
-        rows_of_topics = {row[0] if fitting else number: row[0] for number, row in enumerate(rows, start=1)}
+        topic_ids = {row[0]: row[0] if fitting else number for number, row in enumerate(rows, start=1)}
         definitions = self._definitions()
         descriptors = self._descriptors()
-        topics = {
-            topic_id: _topic(row[1:], definitions, descriptors)
-            for topic_id, row in zip(rows_of_topics, rows, strict=True)
-        }
-        return rows_of_topics, topics
+        return topic_ids, {topic_ids[row[0]]: _topic(row[1:], definitions, descriptors) for row in rows}
 
     def _definitions(self) -> dict[str, RecordedDefinition]:
-        rows = self._texts("message_definitions", "topic_type", "encoding", "encoded_message_definition")
+        names = {
+            row: (name, encoding)
+            for row, name, encoding in self._texts(_DEFINITIONS, "topic_type", "encoding")
+        }
+        texts = self._query(f"SELECT rowid, encoded_message_definition FROM {_DEFINITIONS}") if names else ()
         return {
-            type_name: RecordedDefinition(encoding, text.encode())
-            for _, type_name, encoding, text in rows
-            if encoding in _ENCODINGS  # rosbag2 writes `unknown` for a type whose definition it did not find
+            names[row][0]: RecordedDefinition(names[row][1], self._bytes(text, _DEFINITIONS, row))
+            for row, text in texts
+            if names[row][1] not in ("", "unknown")  # rosbag2 did not find the definition
         }
 
     def _descriptors(self) -> dict[str, tuple[str, RecordedDefinition]]:
-        rows = self._texts("protobuf_descriptors", "topic_type", "full_name")
-        names = {row: (type_name, full_name) for row, type_name, full_name in rows}
-        if not names:
-            return {}
-        found: dict[str, tuple[str, RecordedDefinition]] = {}
-        for row, data in self._query("SELECT rowid, descriptor_set FROM protobuf_descriptors"):
-            if not isinstance(data, bytes):
-                raise BagError(
-                    f"{self.path}: table protobuf_descriptors, row {row}: expected bytes, not {data!r}"
-                )
-            type_name, full_name = names[row]
-            found[type_name] = full_name, RecordedDefinition(PROTOBUF, data)
-        return found
+        names = {
+            row: (name, full_name)
+            for row, name, full_name in self._texts(_DESCRIPTORS, "topic_type", "full_name")
+        }
+        sets = self._query(f"SELECT rowid, descriptor_set FROM {_DESCRIPTORS}") if names else ()
+        return {
+            names[row][0]: (names[row][1], RecordedDefinition(PROTOBUF, self._bytes(data, _DESCRIPTORS, row)))
+            for row, data in sets
+        }
 
     def _read_metadata(self) -> list[tuple[str, Mapping[str, str]]]:
         """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
         return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
 
     def _selecting(self, selection: Selection) -> tuple[str, list[int]]:
-        """Return the query for the messages of a selection that come after a row and up to another, and its values."""
-        conditions = ["id > ?", "id <= ?"]
+        """Return the query for the messages of a selection after a row, which is its first value, and the other values.
+
+        The plus keeps sqlite from sorting whole messages by the index of times.
+        """
+        conditions = ["id > ?"]
         values: list[int] = []
         if selection.topic_ids is not None:
-            rows = [
-                self._rows_of_topics[topic] for topic in selection.topic_ids if topic in self._rows_of_topics
-            ]
-            conditions.append(f"topic_id IN ({', '.join(map(str, rows))})")
-        # The plus keeps sqlite from sorting whole messages by the index of times.
+            rows = [str(row) for row, topic_id in self._topic_ids.items() if topic_id in selection.topic_ids]
+            conditions.append(f"topic_id IN ({', '.join(rows)})")
         if selection.start_time:
             conditions.append("+timestamp >= ?")
             values.append(min(selection.start_time, _LAST_ROW))
         if selection.end_time is not None:
             conditions.append("+timestamp < ?")
             values.append(min(selection.end_time, _LAST_ROW))
-        return (
-            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id",
-            values,
+        query = (
+            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id"
         )
+        return query, values
 
-    def _batches(self, query: str, values: list[int]) -> Iterator[list[tuple[Any, ...]]]:
-        rows: list[tuple[Any, ...]] = []
-        size = 0
-        for row in self._query(query, [-_LAST_ROW - 1, _LAST_ROW, *values]):
-            rows.append(row)
-            size += 64 + (len(row[3]) if isinstance(row[3], bytes) else 0)
-            if size >= CHUNK_SIZE:
-                yield rows
-                rows = []
-                size = 0
-        if rows:
-            yield rows
+    def _messages(self, query: str, values: list[int]) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a query of `_selecting`, without damaged ones if the file is to be salvaged."""
+        row: tuple[Any, ...] = (_FIRST_ROW - 1,)
+        done = 0
+        while True:
+            try:
+                for done, row in enumerate(
+                    self._connection.execute(query, [row[0], *values]), start=done + 1
+                ):
+                    yield row
+                return
+            except sqlite3.Error as error:
+                where = f"{self.path}: table messages, after row {row[0]}"
+                if not self._salvage:
+                    raise BagError(
+                        f"{where}: {_reason(error)}; {done} messages before it were read"
+                    ) from None
+                skipped = self._damaged_rows(query, row[0], values)
+                self.warnings.append(
+                    f"{where}: {_reason(error)}; {skipped or 'all further'} rows are left out"
+                )
+                if skipped is None:
+                    return
+                row = (row[0] + skipped,)
 
-    def _chunk(self, rows: list[tuple[Any, ...]], ids: Mapping[int, int], done: int) -> StoredChunk:
+    def _damaged_rows(self, query: str, last: int, values: list[int]) -> int | None:
+        """Return how many rows after one cannot be read; None for all."""
+        step = 1
+        while not self._readable(query, last + step, values):
+            step *= 2
+            if last + step > _LAST_ROW:
+                return None
+        unreadable = step // 2
+        while step - unreadable > 1:
+            middle = (step + unreadable) // 2
+            if self._readable(query, last + middle, values):
+                step = middle
+            else:
+                unreadable = middle
+        return step
+
+    def _readable(self, query: str, last: int, values: list[int]) -> bool:
+        try:
+            self._connection.execute(f"{query} LIMIT 1", [last, *values]).fetchall()
+        except sqlite3.Error:
+            return False
+        return True
+
+    def _chunk(self, rows: list[tuple[Any, ...]], done: int) -> StoredChunk:
         where = f"{self.path}, table messages, rows {rows[0][0]} to {rows[-1][0]}"
         _, topics, times, messages = zip(*rows, strict=True)
         try:
             log_times = array("Q", times)
-            topic_ids = array("H", [ids[topic] for topic in topics])
+            topic_ids = array("H", [self._topic_ids[topic] for topic in topics])
             data = pack_records(topic_ids, array("I", bytes(4 * len(rows))), log_times, log_times, messages)
         except (TypeError, OverflowError, KeyError):
-            raise self._wrong_row(rows, ids, done) from None
+            raise self._wrong_row(rows, done) from None
         return StoredChunk(where, data, "", len(data), 0, min(log_times), max(log_times), len(rows))
 
-    def _wrong_row(self, rows: list[tuple[Any, ...]], ids: Mapping[int, int], done: int) -> BagError:
+    def _wrong_row(self, rows: list[tuple[Any, ...]], done: int) -> BagError:
         for number, (row, topic, time, data) in enumerate(rows):
             reason = ""
-            if topic not in ids:
+            if topic not in self._topic_ids:
                 reason = f"topic_id {topic!r} is not in the table topics"
             elif not isinstance(time, int) or time < 0:
                 reason = f"timestamp {time!r} is not a time in nanoseconds since 1970"
@@ -278,6 +324,15 @@ class SqliteReader:
                 read = f"{done + number} messages before it were read"
                 return BagError(f"{self.path}: table messages, row {row}: {reason}; {read}")
         raise AssertionError("a row that cannot be packed is wrong")
+
+
+def definition_names(type_name: str) -> list[str]:
+    """Return the names under which a definition may be: that of a service event is that of its service, by its name."""
+    names = [type_name]
+    if "/srv/" in type_name or "/action/" in type_name:
+        while "_" in names[-1].rsplit("/", 1)[1]:
+            names.append(names[-1].rsplit("_", 1)[0])
+    return names
 
 
 def _topic(
