@@ -12,13 +12,14 @@ from collections.abc import Hashable, Iterable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from rosidl_adapter_proto.bags.descriptors import descriptor_set, recorded_class
 from rosidl_adapter_proto.bags.model import PROTOBUF, RecordedDefinition, Topic
 from rosidl_adapter_proto.errors import BagError, DefinitionError, MissingDefinitionError, SchemaError
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog, interface_base
-from rosidl_adapter_proto.interfaces.find import Definition, Package, Source
+from rosidl_adapter_proto.interfaces.find import Definition, Package
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.recorded import (
     ENCODINGS,
@@ -34,9 +35,19 @@ from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
 _PROTO_NAME = re.compile(r"(\w+)\.(msg|srv|action)\.pb\.(\w+)")
 _KNOWN_HASH = "RIHS01_"
 _NEVER_CHANGED = {TypeName("builtin_interfaces", "msg", name) for name in ("Time", "Duration")}
-_ADVICE = (
-    "give the folder of its package with --interfaces FOLDER, or the distribution it is from with --distro"
-)
+_ADVICE = "give the folder of its package with --include FOLDER, or the distribution it is from with --distro"
+
+
+class RecordedTypes(NamedTuple):
+    """What there is to generate of a recording.
+
+    Attributes:
+        definitions: The definitions in it.
+        types: The types of its topics: messages, services and actions.
+    """
+
+    definitions: Package
+    types: tuple[TypeName, ...]
 
 
 class BagTypes:
@@ -106,31 +117,26 @@ class BagTypes:
         recorded = _recorded(topic)
         return recorded if self._definitions(topic) else ros_definition(self.schema(topic))
 
-    def all(self) -> tuple[Source, tuple[TypeName, ...]]:
-        """Return the definitions in the recording, and the types of all topics with what it defines besides.
-
-        Topics of protobuf messages that are no ROS types are left out.
+    def all(self) -> RecordedTypes:
+        """Return what there is to generate of the recording; protobuf messages that are no ROS types are left out.
 
         Raises:
-            BagError: Two topics have other definitions of the same type, or one has a definition that is none.
+            BagError: Two topics have other definitions of the same type; or, of a topic, as for `schema`.
         """
         known: dict[TypeName, tuple[Definition, str]] = {}
-        names: dict[TypeName, None] = {}
+        types: dict[TypeName, None] = {}
         for topic in self._topics:
             if topic.serialization_format == PROTOBUF and not _is_ros_type(topic):
                 continue
-            try:
-                definitions = self._definitions(topic)
-                names.update(dict.fromkeys(definitions or [interface_base(_ros_type(topic))]))
-            except DefinitionError as error:
-                raise _problem(topic, error) from None
-            for name, definition in definitions.items():
+            schema = self.schema(topic)
+            types[interface_base(TypeName.parse(schema.type_name))] = None
+            for name, definition in self._definitions(topic).items():
                 other, user = known.setdefault(name, (definition, topic.name))
                 if not _is_same(definition, other):
                     raise BagError(
                         f"{name} is not the same in topics {user} and {topic.name}: code can only have one version"
                     )
-        return recorded_source({name: each for name, (each, _) in known.items()}), tuple(names)
+        return RecordedTypes({name: each for name, (each, _) in known.items()}, tuple(types))
 
     def _schema(self, topic: Topic) -> Schema:
         try:

@@ -127,9 +127,9 @@ def test_another_version_than_the_recorded_one_is_refused() -> None:
     of_humble = types(distro="humble").schema(topic(type_name="sensor_msgs/msg/Range")).type_hash
     assert types(distro="kilted").schema(recorded).type_hash == of_kilted
     assert refused(recorded, distro="humble") == (
-        f"topic /track (sensor_msgs/msg/Range): it was recorded with the type hash {of_kilted}, but has {of_humble} with "
-        "sensor_msgs/msg/Range from embedded store humble, std_msgs/msg/Header from embedded store humble: give the "
-        "folder of its package with --interfaces FOLDER, or the distribution it is from with --distro"
+        f"topic /track (sensor_msgs/msg/Range): it was recorded with the type hash {of_kilted}, but has {of_humble} "
+        "with sensor_msgs/msg/Range from embedded store humble, std_msgs/msg/Header from embedded store humble: give "
+        "the folder of its package with --include FOLDER, or the distribution it is from with --distro"
     )
 
 
@@ -163,7 +163,8 @@ def test_missing_definition() -> None:
         bag.schema(missing)
     assert str(caught.value) == (
         "topic /track (robot/msg/Track): package 'robot' was not found; looked in the recording, embedded store jazzy "
-        "(messages only); give the folder of its package with --interfaces FOLDER, or the distribution it is from with --distro"
+        "(messages only); give the folder of its package with --include FOLDER, or the distribution it is from with "
+        "--distro"
     )
 
 
@@ -181,7 +182,7 @@ def test_definition_of_another_topic() -> None:
             "flot64 x\n",
             f"{TOPIC}my_msgs/msg/flot64 was not found, but my_msgs/msg/Track.x (definition of topic /track: MSG "
             "my_msgs/msg/Track:1:8) needs it\nlooked in the recording, embedded store jazzy (messages only); give the "
-            "folder of its package with --interfaces FOLDER, or the distribution it is from with --distro",
+            "folder of its package with --include FOLDER, or the distribution it is from with --distro",
         ),
         (
             "int8 x y\n",
@@ -234,9 +235,8 @@ def test_service_events() -> None:
     assert transcoder.cdr_to_proto(transcoder.proto_to_cdr(data)) == data or message.request[0].a == 5  # type: ignore[attr-defined]
     known = topic(type_name="my_msgs/srv/Find_Event", definition=event.definition, type_hash=schema.type_hash)
     assert types(known, distro="jazzy").schema(known).type_hash == schema.type_hash
-    definitions, names = types(event, distro="jazzy").all()
-    assert names == (TypeName("my_msgs", "srv", "Find"),)
-    assert list(definitions.packages["my_msgs"]) == [TypeName("my_msgs", "srv", "Find")]
+    found = types(event, distro="jazzy").all()
+    assert found.types == tuple(found.definitions) == (TypeName("my_msgs", "srv", "Find"),)
 
 
 def test_unknown_folder_and_distribution(tmp_path: Path) -> None:
@@ -362,7 +362,7 @@ def test_protobuf_messages_of_others_are_read() -> None:
             "topic /cloud (foxglove.PointCloud): its messages are protobuf messages of no ROS type: they can be read, "
             "but not converted"
         )
-        assert types(recorded).all()[1] == ()
+        assert types(recorded).all() == ({}, ())
 
 
 def changed(file: FileDescriptorProto, **values: Any) -> FileDescriptorProto:
