@@ -453,6 +453,21 @@ def test_ros1() -> None:
     converted = in_protobuf(recorded, bag)
     assert converted.ros_definition == recorded.definition
     assert types(converted).schema(converted).message_class is schema.message_class
-    # What ROS 2 has of the header has the same numbers.
-    header = types().schema(topic(type_name="std_msgs/msg/Header")).message_class
+    # What ROS 2 has of the header has the same numbers, and is not mistaken for that of ROS 1.
+    header = types(recorded).schema(topic(type_name="std_msgs/msg/Header")).message_class
+    assert "seq" not in header.DESCRIPTOR.fields_by_name
     assert header.FromString(message.header.SerializeToString()).stamp.sec == 7  # type: ignore[attr-defined]
+
+
+def test_rosbags_reads_the_definitions() -> None:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = Catalog((store_source("jazzy"),))
+    registry = TypeRegistry(store)
+    for name in registry:
+        text = ros_definition(registry[name]).data.decode()
+        if "char" in text.split() or "char[" in text:  # rosbags takes it for another type
+            continue
+        typestore = get_typestore(Stores.EMPTY)
+        typestore.register(get_types_from_msg(text, name))
+        assert typestore.hash_rihs01(name) == registry[name].type_hash, name

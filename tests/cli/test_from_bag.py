@@ -142,8 +142,8 @@ def test_topics_without_messages_need_no_definition(folder: Path, run: Run) -> N
     assert (ended.code, ended.err) == (
         3,
         "Error: topic /lost (qualia/msg/A): package 'qualia' was not found; looked in the recording, embedded store "
-        "jazzy (messages only); give the folder of its package with --include FOLDER, or the distribution it is from with "
-        "--distro\n",
+        "jazzy (messages only); give the folder of its package with --include FOLDER, or the distribution it is from "
+        "with --distro\n",
     )
 
 

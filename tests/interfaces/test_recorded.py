@@ -385,6 +385,21 @@ def test_every_installed_idl_has_its_hash(ros_prefix: object) -> None:
         ), path
 
 
+@pytest.mark.parametrize("suffix", [".srv", ".action"])
+def test_every_part_of_services_and_actions_has_its_hash(suffix: str, ros_prefix: object) -> None:
+    installed = Catalog(tuple(prefix_sources()))
+    paths = [each for each in oracle.installed_definitions(suffix) if each.with_suffix(".json").exists()]
+    assert paths
+    for path in paths:
+        needed = type_closure(installed, oracle.type_name(path))
+        _, text = recorded_text({each: installed.definition(each) for each in reversed(needed)})
+        described = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["type_hashes"]
+        own = f"{path.parts[-3]}/{path.parts[-2]}/{path.stem}"
+        for each in described:
+            if each["type_name"].startswith(own):
+                assert hash_of(text.decode(), each["type_name"]) == each["hash_string"]
+
+
 @pytest.mark.parametrize("distribution", ["humble", "noetic"])
 def test_every_message_as_rosbags_writes_it(distribution: str) -> None:
     from rosbags.typesys import Stores, get_typestore
