@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from google.protobuf import timestamp_pb2
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -195,6 +196,11 @@ def test_definition_of_another_topic() -> None:
             "my_msgs/msg/Track:1:7)",
         ),
         (
+            "".join(f"T{n + 1} t\n{RULE}\nMSG: my_msgs/T{n + 1}\n" for n in range(200)) + "int8 a\n",
+            f"{TOPIC}my_msgs/msg/T100.t (definition of topic /track: MSG my_msgs/msg/T100:1:6) nests messages more than "
+            "100 deep, which protobuf does not read; flatten my_msgs/msg/T101 or what is in it",
+        ),
+        (
             "float64[99999999999] x\n",
             f"{TOPIC}my_msgs/msg/Track.x (definition of topic /track: MSG my_msgs/msg/Track:1:22): the length of an "
             "array must be at most 4294967295, since ROS sends no more, not 99999999999",
@@ -363,6 +369,26 @@ def test_protobuf_messages_of_others_are_read() -> None:
             "but not converted"
         )
         assert types(recorded).all() == ({}, ())
+
+
+def test_messages_with_maps_and_well_known_types() -> None:
+    file = FileDescriptorProto(
+        name="a.proto", package="a", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
+    )
+    message = file.message_type.add(name="A")
+    entry = message.nested_type.add(name="TimesEntry")
+    entry.options.map_entry = True
+    single, many = FieldDescriptorProto.LABEL_OPTIONAL, FieldDescriptorProto.LABEL_REPEATED
+    text, nested = FieldDescriptorProto.TYPE_STRING, FieldDescriptorProto.TYPE_MESSAGE
+    entry.field.add(name="key", number=1, label=single, type=text)
+    entry.field.add(name="value", number=2, label=single, type=nested, type_name=".google.protobuf.Timestamp")
+    message.field.add(name="times", number=1, label=many, type=nested, type_name=".a.A.TimesEntry")
+    message.field.add(name="inner", number=2, label=single, type=nested, type_name=".a.A")
+    timestamp = FileDescriptorProto.FromString(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    recorded = cloud(file, timestamp, name="a.A")
+    read: Any = types(recorded).message_class(recorded)()
+    read.inner.times["x"].FromJsonString("1970-01-01T00:00:05Z")
+    assert read.inner.times["x"].seconds == 5
 
 
 def changed(file: FileDescriptorProto, **values: Any) -> FileDescriptorProto:
