@@ -118,7 +118,7 @@ class BagTypes:
         recorded = _recorded(topic)
         return recorded if self._definitions(topic) else ros_definition(self.schema(topic))
 
-    def all(self) -> RecordedTypes:
+    def recorded_types(self) -> RecordedTypes:
         """Return what there is to generate of the recording; protobuf messages that are no ROS types are left out.
 
         Raises:

@@ -98,7 +98,7 @@ def test_each_topic_has_its_own_version() -> None:
         old_point.x = 1.5
     assert bag.warnings == []
     with pytest.raises(BagError) as caught:
-        bag.all()
+        bag.recorded_types()
     assert str(caught.value) == (
         "my_msgs/msg/Point is not the same in topics /old and /new: code can only have one version"
     )
@@ -197,8 +197,8 @@ def test_definition_of_another_topic() -> None:
         ),
         (
             "".join(f"T{n + 1} t\n{RULE}\nMSG: my_msgs/T{n + 1}\n" for n in range(200)) + "int8 a\n",
-            f"{TOPIC}my_msgs/msg/T100.t (definition of topic /track: MSG my_msgs/msg/T100:1:6) nests messages more than "
-            "100 deep, which protobuf does not read; flatten my_msgs/msg/T101 or what is in it",
+            f"{TOPIC}my_msgs/msg/T100.t (definition of topic /track: MSG my_msgs/msg/T100:1:6) nests messages more "
+            "than 100 deep, which protobuf does not read; flatten my_msgs/msg/T101 or what is in it",
         ),
         (
             "float64[99999999999] x\n",
@@ -241,7 +241,7 @@ def test_service_events() -> None:
     assert transcoder.cdr_to_proto(transcoder.proto_to_cdr(data)) == data or message.request[0].a == 5  # type: ignore[attr-defined]
     known = topic(type_name="my_msgs/srv/Find_Event", definition=event.definition, type_hash=schema.type_hash)
     assert types(known, distro="jazzy").schema(known).type_hash == schema.type_hash
-    found = types(event, distro="jazzy").all()
+    found = types(event, distro="jazzy").recorded_types()
     assert found.types == tuple(found.definitions) == (TypeName("my_msgs", "srv", "Find"),)
 
 
@@ -368,7 +368,7 @@ def test_protobuf_messages_of_others_are_read() -> None:
             "topic /cloud (foxglove.PointCloud): its messages are protobuf messages of no ROS type: they can be read, "
             "but not converted"
         )
-        assert types(recorded).all() == ({}, ())
+        assert types(recorded).recorded_types() == ({}, ())
 
 
 def test_messages_with_maps_and_well_known_types() -> None:
