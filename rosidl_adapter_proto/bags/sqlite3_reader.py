@@ -11,7 +11,7 @@ import shutil
 import sqlite3
 import tempfile
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
@@ -37,7 +37,8 @@ CHUNK_SIZE = 2**20
 
 MAXIMUM_TOPIC_ID = 2**16 - 1
 _ROW_SIZE = 64  # bytes of a row beside its message, about
-_FIRST_ROW, _LAST_ROW = -(2**63) + 1, 2**63 - 1
+_FIRST_ROW, _LAST_ROW = -(2**63), 2**63 - 1
+_ERRORS = (sqlite3.Error, UnicodeDecodeError)  # the latter for names of columns
 _DEFINITIONS = "message_definitions"
 _DESCRIPTORS = "protobuf_descriptors"
 
@@ -82,11 +83,11 @@ class SqliteReader:
         """What is in the file, counted: a database does not keep it."""
         query = "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id"
         try:
-            groups = list(self._query(query))
+            groups = self._query(query)
         except BagError:
             if not self._salvage:
                 raise
-            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(*self._selecting(EVERYTHING))]
+            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(EVERYTHING)]
         counts = dict.fromkeys(self.topics, 0)
         for topic, count, _, _ in groups:
             if topic not in self._topic_ids:
@@ -99,15 +100,17 @@ class SqliteReader:
         """Yield nothing: a database has no room for them."""
         return iter(())
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        """Yield the messages of a selection, in the order of the table, as chunks of about `CHUNK_SIZE` bytes.
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        """Yield the messages of a selection as chunks of about `CHUNK_SIZE` bytes; see `StorageReader.chunks`.
 
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
         rows: list[tuple[Any, ...]] = []
         size = done = 0
-        for row in self._messages(*self._selecting(selection)):
+        for row in self._messages(selection, in_time_order):
             rows.append(row)
             size += _ROW_SIZE + (len(row[3]) if isinstance(row[3], bytes) else 0)
             if size >= CHUNK_SIZE:
@@ -152,10 +155,10 @@ class SqliteReader:
             connection.close()
         return folder / path.name
 
-    def _query(self, query: str, values: Sequence[object] = ()) -> Iterator[tuple[Any, ...]]:
+    def _query(self, query: str) -> list[tuple[Any, ...]]:
         try:
-            yield from self._connection.execute(query, values)
-        except sqlite3.Error as error:
+            return self._connection.execute(query).fetchall()
+        except _ERRORS as error:
             raise BagError(f"{self.path}: {_reason(error)}") from None
 
     def _tables(self) -> list[str]:
@@ -231,74 +234,86 @@ class SqliteReader:
         """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
         return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
 
-    def _selecting(self, selection: Selection) -> tuple[str, list[int]]:
-        """Return the query for the messages of a selection after a row, which is its first value, and the other values.
+    def _selecting(self, selection: Selection, in_time_order: bool) -> tuple[str, list[int]]:
+        """Return the query for the messages of a selection, and its values after the first, which is a row to begin at.
 
-        The plus keeps sqlite from sorting whole messages by the index of times.
+        A plus keeps sqlite from sorting whole messages by the index of times.
         """
-        conditions = ["id > ?"]
+        time = "timestamp" if in_time_order else "+timestamp"
+        conditions = ["id >= ?"]
         values: list[int] = []
         if selection.topic_ids is not None:
             rows = [str(row) for row, topic_id in self._topic_ids.items() if topic_id in selection.topic_ids]
             conditions.append(f"topic_id IN ({', '.join(rows)})")
         if selection.start_time:
-            conditions.append("+timestamp >= ?")
+            conditions.append(f"{time} >= ?")
             values.append(min(selection.start_time, _LAST_ROW))
         if selection.end_time is not None:
-            conditions.append("+timestamp < ?")
+            conditions.append(f"{time} < ?")
             values.append(min(selection.end_time, _LAST_ROW))
-        query = (
-            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id"
-        )
-        return query, values
+        order = "timestamp, id" if in_time_order else "id"
+        where = " AND ".join(conditions)
+        return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
-    def _messages(self, query: str, values: list[int]) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of a query of `_selecting`, without damaged ones if the file is to be salvaged."""
-        row: tuple[Any, ...] = (_FIRST_ROW - 1,)
+    def _messages(self, selection: Selection, in_time_order: bool = False) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a selection; in the order of the table, damaged ones are left out to salvage a file."""
+        query, values = self._selecting(selection, in_time_order)
+        first = _FIRST_ROW
         done = 0
         while True:
+            row = None
             try:
-                for done, row in enumerate(
-                    self._connection.execute(query, [row[0], *values]), start=done + 1
-                ):
+                for row in self._connection.execute(query, [first, *values]):
                     yield row
+                    done += 1
                 return
-            except sqlite3.Error as error:
-                where = f"{self.path}: table messages, after row {row[0]}"
-                if not self._salvage:
+            except _ERRORS as error:
+                first = row[0] + 1 if row else first
+                if not self._salvage or in_time_order:
+                    where = f"{self.path}: table messages, from row {first} on"
                     raise BagError(
                         f"{where}: {_reason(error)}; {done} messages before it were read"
                     ) from None
-                skipped = self._damaged_rows(query, row[0], values)
-                self.warnings.append(
-                    f"{where}: {_reason(error)}; {skipped or 'all further'} rows are left out"
-                )
-                if skipped is None:
-                    return
-                row = (row[0] + skipped,)
+                reason = _reason(error)
+            # Python asks for the row after a good one before it gives that.
+            row = self._first_row(query, first, values)
+            if row:
+                yield row
+                done += 1
+                first = row[0] + 1
+                continue
+            skipped = self._damaged_rows(query, first, values)
+            last = f"to {first + skipped - 1}" if skipped else "on"
+            self.warnings.append(f"{self.path}: table messages, rows {first} {last} are left out: {reason}")
+            if not skipped:
+                return
+            first += skipped
 
-    def _damaged_rows(self, query: str, last: int, values: list[int]) -> int | None:
-        """Return how many rows after one cannot be read; None for all."""
+    def _damaged_rows(self, query: str, first: int, values: list[int]) -> int:
+        """Return how many row numbers from one on cannot be read; 0 for all."""
         step = 1
-        while not self._readable(query, last + step, values):
+        while not self._first_row(query, first + step, values):
             step *= 2
-            if last + step > _LAST_ROW:
-                return None
+            if first + step > _LAST_ROW:
+                return 0
         unreadable = step // 2
         while step - unreadable > 1:
             middle = (step + unreadable) // 2
-            if self._readable(query, last + middle, values):
+            if self._first_row(query, first + middle, values):
                 step = middle
             else:
                 unreadable = middle
         return step
 
-    def _readable(self, query: str, last: int, values: list[int]) -> bool:
+    def _first_row(self, query: str, first: int, values: list[int]) -> tuple[Any, ...] | None:
+        """Return the first row from one on; None if it cannot be read, or there is none."""
         try:
-            self._connection.execute(f"{query} LIMIT 1", [last, *values]).fetchall()
-        except sqlite3.Error:
-            return False
-        return True
+            found: tuple[Any, ...] | None = self._connection.execute(
+                f"{query} LIMIT 1", [first, *values]
+            ).fetchone()
+        except _ERRORS:
+            return None
+        return found
 
     def _chunk(self, rows: list[tuple[Any, ...]], done: int) -> StoredChunk:
         where = f"{self.path}, table messages, rows {rows[0][0]} to {rows[-1][0]}"
@@ -341,10 +356,8 @@ def _topic(
     descriptors: Mapping[str, tuple[str, RecordedDefinition]],
 ) -> Topic:
     name, type_name, serialization_format, qos_profiles, type_hash = values
-    # The definition of a service event is that of its service, by the service's name.
-    definition = definitions.get(type_name) or definitions.get(
-        type_name.removesuffix("_Event"), RecordedDefinition()
-    )
+    names = [name for name in definition_names(type_name) if name in definitions]
+    definition = definitions[names[0]] if names else RecordedDefinition()
     schema_name, descriptor = descriptors.get(type_name, ("", RecordedDefinition()))
     protobuf = serialization_format == PROTOBUF
     return Topic(
@@ -359,7 +372,7 @@ def _topic(
     )
 
 
-def _reason(error: sqlite3.Error) -> str:
-    if isinstance(error, sqlite3.DatabaseError) and "not a database" in str(error):
+def _reason(error: Exception) -> str:
+    if "not a database" in str(error):
         return "no sqlite3 database"
     return f"sqlite3 says: {error}"
