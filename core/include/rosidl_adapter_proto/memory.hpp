@@ -3,17 +3,20 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <utility>
 
 namespace rosidl_proto {
 
 class Memory {
  public:
   Memory() = default;
-  Memory(Memory&& other) noexcept : data_(other.data_), size_(other.size_), capacity_(other.capacity_) {
-    other.data_ = nullptr;
-    other.size_ = other.capacity_ = 0;
+  Memory(Memory&& other) noexcept { *this = std::move(other); }
+  Memory& operator=(Memory&& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+    return *this;
   }
-  Memory& operator=(Memory&&) = delete;
   ~Memory() { std::free(data_); }
 
   uint8_t* data() { return data_; }
@@ -34,6 +37,10 @@ class Memory {
   // Makes room for `capacity` bytes in all, which are not fewer than there are; false if there is no memory.
   bool grow(uint64_t capacity) {
     if (capacity > SIZE_MAX) return false;
+    if (size_ == 0) {  // there is nothing to move
+      std::free(std::exchange(data_, nullptr));
+      capacity_ = 0;
+    }
     void* const memory = std::realloc(data_, static_cast<size_t>(capacity));
     if (memory == nullptr) return false;
     data_ = static_cast<uint8_t*>(memory);

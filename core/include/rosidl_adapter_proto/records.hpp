@@ -33,6 +33,7 @@ enum class RecordsReason : uint8_t {
   ShortMessage,
   NoRoute,
   TooLarge,
+  ChunkTooLarge,
   OutOfMemory,
 };
 
