@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from rosidl_adapter_proto.converters.cdr import CdrConverter
-from rosidl_adapter_proto.converters.interfaces import SerializedBagMessage
+from rosidl_adapter_proto.converters.interfaces import SerializedBagMessage, with_data
 from rosidl_adapter_proto.converters.protobuf import ProtobufConverter
 from rosidl_adapter_proto.converters.registry import SUFFIX, ConverterRegistry
 from rosidl_adapter_proto.converters.ros1 import Ros1Deserializer
@@ -16,6 +15,8 @@ from rosidl_adapter_proto.errors import ConversionError, ConverterError, Error
 from rosidl_adapter_proto.transcode.records import Direction
 
 if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
     from rosidl_adapter_proto.converters.interfaces import Result
     from rosidl_adapter_proto.schema.registry import Schema
 
@@ -94,16 +95,16 @@ class Converter:
             message: The message.
             type_support: The type of the message.
             output_type_support: What it becomes, if that is another version of the type, of which
-                `check_same_fields` has found that it reads the same protobuf bytes.
+                `ros1.check_ros2_type` has found that it reads the same protobuf bytes.
 
         Raises:
             ConversionError: It is no message of the type, or the other format cannot have it.
-            ConverterError: A plugin does not do what its interface says.
         """
-        [converted] = self.convert_batch([message], type_support, output_type_support)
-        if isinstance(converted, Error):
-            raise converted
-        return converted
+        if self._is_copy:
+            return message
+        read, write = self._deserializer.to_protobuf, self._serializer.from_protobuf
+        protobuf = _one(message, self.input_format + SUFFIX, read, type_support)
+        return _one(protobuf, self.output_format + SUFFIX, write, output_type_support or type_support)
 
     def convert_batch(
         self,
@@ -117,16 +118,33 @@ class Converter:
             For each message the new one, or the `ConversionError` that `convert` would raise, in their order.
 
         Raises:
-            ConverterError: A plugin does not do what its interface says.
+            ConverterError: A plugin fails for the batch as a whole, or leaves out messages.
         """
         if self._is_copy:
             return list(messages)
         read, write = self._deserializer.to_protobuf_batch, self._serializer.from_protobuf_batch
-        protobuf = _step(messages, self.input_format + SUFFIX, read, type_support)
-        return _step(protobuf, self.output_format + SUFFIX, write, output_type_support or type_support)
+        protobuf = _many(messages, self.input_format + SUFFIX, read, type_support)
+        return _many(protobuf, self.output_format + SUFFIX, write, output_type_support or type_support)
 
 
-def _step(
+def _one(
+    message: SerializedBagMessage,
+    plugin: str,
+    convert: Callable[[SerializedBagMessage, Schema], Buffer],
+    type_support: Schema,
+) -> SerializedBagMessage:
+    """Return a message as a plugin converts it."""
+    try:
+        result: Result = convert(message, type_support)
+    except Exception as error:  # plugins may raise anything
+        result = error
+    converted = _converted(message, result, plugin, type_support)
+    if isinstance(converted, Error):
+        raise converted
+    return converted
+
+
+def _many(
     messages: Sequence[Converted],
     plugin: str,
     convert: Callable[[Sequence[SerializedBagMessage], Schema], Sequence[Result]],
@@ -153,7 +171,7 @@ def _converted(message: SerializedBagMessage, result: Result, plugin: str, type_
     if not isinstance(result, Exception):
         try:
             memoryview(result)
-            return replace(message, serialized_data=result)
+            return with_data(message, result)
         except TypeError as error:
             result = error
     failed = ConversionError(
@@ -166,20 +184,13 @@ def _converted(message: SerializedBagMessage, result: Result, plugin: str, type_
 def _not_found(registry: ConverterRegistry, serialization_format: str, is_input: bool) -> str:
     """Return rosbag2's words for a missing converter, and what there is."""
     name = serialization_format + SUFFIX
+    direction, other = ("read", "only writes it") if is_input else ("written", "only reads it")
     plugins = registry.plugins()
-    known = sorted(
-        {
-            each.serialization_format
-            for each in plugins
-            if (each.deserializes if is_input else each.serializes)
-        }
-    )
-    other = "only writes it" if is_input else "only reads it"
-    reason = next(
-        (f"{each.plugin} {other}" for each in plugins if each.plugin.name == name),
-        f"no plugin is called {name}",
-    )
+    named = [each.plugin for each in plugins if each.plugin.name == name]
+    reason = f"{named[0]} {other}" if named else f"no plugin is called {name}"
+    usable = [each for each in plugins if (each.deserializes if is_input else each.serializes)]
+    known = ", ".join(sorted({each.serialization_format for each in usable}))
     return (
         f"Could not find converter for format {serialization_format}: {reason}; "
-        f"formats that can be {'read' if is_input else 'written'}: {', '.join(known)}"
+        f"formats that can be {direction}: {known}"
     )

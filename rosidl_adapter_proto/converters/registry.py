@@ -63,7 +63,7 @@ class Plugin:
         """
         try:
             found = self.find()
-        except Exception as error:  # modules of others may raise anything
+        except (Exception, SystemExit) as error:  # modules of others may do anything
             raise self._broken(f"{type(error).__name__}: {error}") from error
         if not isinstance(found, type):
             raise self._broken(f"it is no class, but {type(found).__name__}")
@@ -85,7 +85,7 @@ class Plugin:
         plugin_class = self.plugin_class
         try:
             return plugin_class()
-        except Exception as error:  # so may their constructors
+        except Exception as error:  # and so may their constructors
             raise self._broken(f"{type(error).__name__}: {error}") from error
 
     def _broken(self, reason: str) -> ConverterError:
@@ -117,13 +117,19 @@ class PluginStatus:
 class ConverterRegistry:
     """Gives what reads and what writes a serialization format, by its name.
 
-    For each direction, a class for this direction alone comes first, then one for both (rosbag2's order). Built-in
-    formats have no other plugins. Two classes that could equally be meant, and a class that cannot be used, are errors
-    when their format is asked for, and only then. A registry can be used from many threads.
+    For each direction, a class for this direction alone comes first, then one for both (rosbag2's order, where formats
+    of installed middleware come last). Built-in formats have no other plugins. Two classes that could equally be
+    meant, and a class that cannot be used, are errors when their format is asked for, and only then.
+
+    A registry can be used from many threads. In another process, it has what was registered here and is installed
+    there.
     """
 
     def __init__(self) -> None:
         self._registered: list[Plugin] = []
+
+    def __reduce__(self) -> tuple[Callable[..., ConverterRegistry], tuple[Any, ...]]:
+        return _with_registered, tuple((each.name, each.plugin_class) for each in self._registered)
 
     def register(
         self,
@@ -225,6 +231,13 @@ class ConverterRegistry:
             if candidates:
                 return candidates[0]
         return None
+
+
+def _with_registered(*plugins: tuple[str, type[Any]]) -> ConverterRegistry:
+    registry = ConverterRegistry()
+    for name, plugin_class in plugins:
+        registry.register(name, plugin_class)
+    return registry
 
 
 _DIRECTIONS = (SerializationFormatDeserializer, SerializationFormatSerializer)

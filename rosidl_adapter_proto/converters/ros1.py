@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rosidl_adapter_proto.adapter.base import copy_message
-from rosidl_adapter_proto.converters.interfaces import SerializationFormatDeserializer, SerializedBagMessage
+from rosidl_adapter_proto.converters.interfaces import SerializedBagMessage
+from rosidl_adapter_proto.converters.native import NativeDeserializer
 from rosidl_adapter_proto.errors import ConverterError
 from rosidl_adapter_proto.interfaces.description import described_type
 from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, Shape, TypeName, TypeParts
-from rosidl_adapter_proto.transcode import Transcoder
 
 if TYPE_CHECKING:
-    from google.protobuf.message import Message
     from typing_extensions import Buffer
 
     from rosidl_adapter_proto.schema.registry import Schema
@@ -24,30 +22,13 @@ _BYTES = {"int8", "octet"}
 """What `byte` is in ROS 1 and in ROS 2. A byte above 127 is the same one in an array, and a single one an error."""
 
 
-class Ros1Deserializer(SerializationFormatDeserializer):
+class Ros1Deserializer(NativeDeserializer):
     """Reads what ROS 1 has recorded. The types are those of ROS 1, whose `std_msgs/Header` has `seq`."""
 
     serialization_format = "ros1"
 
-    def __init__(self) -> None:
-        self._transcoders = _Transcoders()
-
-    def deserialize(
-        self, serialized_message: SerializedBagMessage, type_support: Schema, ros_message: Message
-    ) -> None:
-        data = self.to_protobuf(serialized_message, type_support)
-        copy_message(type_support.message_class.FromString(bytes(data)), ros_message)
-
     def to_protobuf(self, serialized_message: SerializedBagMessage, type_support: Schema) -> Buffer:
-        transcoder = self._transcoders[type_support]
-        return transcoder.ros1_to_proto(serialized_message.serialized_data)
-
-
-class _Transcoders(dict["Schema", Transcoder]):
-    """The transcoder of each type, made when it is first asked for."""
-
-    def __missing__(self, schema: Schema) -> Transcoder:
-        return self.setdefault(schema, Transcoder(schema.type_description, schema.descriptor))
+        return self._transcoders[type_support].ros1_to_proto(serialized_message.serialized_data)
 
 
 def check_ros2_type(ros1: Schema, ros2: Schema) -> None:

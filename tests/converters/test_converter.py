@@ -8,6 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rosidl_adapter_proto import TypeRegistry
 from rosidl_adapter_proto.converters import (
@@ -16,6 +18,8 @@ from rosidl_adapter_proto.converters import (
     SerializationFormatConverter,
     SerializedBagMessage,
 )
+from rosidl_adapter_proto.converters.cdr import CdrConverter
+from rosidl_adapter_proto.converters.protobuf import ProtobufConverter
 from rosidl_adapter_proto.errors import ConversionError, ConverterError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.transcode.records import Direction
@@ -132,6 +136,7 @@ def test_a_broken_plugin() -> None:
         (("protobuf", "json"), b"\xff", None),
         (("json", "cdr"), b"{", None),
         (("json", "cdr"), b'{"data": "longer"}', None),
+        (("json", "protobuf"), b'{"data": "longer"}', None),
     ],
 )
 def test_one_that_fails_does_not_fail_the_others(
@@ -159,6 +164,17 @@ def test_errors_of_plugins_are_ours(schema: Schema, registry: ConverterRegistry)
         converter.convert(SerializedBagMessage(b'{"other": 1}'), schema)
     assert str(error.value).startswith("my_msgs/msg/Text: json_converter failed: ParseError: ")
     assert isinstance(error.value.__cause__, Exception)
+
+
+@pytest.mark.parametrize("converter", [CdrConverter(), ProtobufConverter()])
+def test_a_message_of_another_class(converter: SerializationFormatConverter, schema: Schema) -> None:
+    other = TypeRegistry()["std_msgs/msg/String"].message_class()
+    with pytest.raises(ConversionError) as error:
+        converter.serialize(other, schema, SerializedBagMessage())
+    assert str(error.value) == (
+        "my_msgs/msg/Text: expected a protobuf message my_msgs.msg.pb.Text, "
+        "not rosidl_proto.std_msgs.msg.String_pb2.String"
+    )
 
 
 def test_results_that_are_no_bytes(schema: Schema) -> None:
@@ -195,7 +211,7 @@ def test_a_batch_that_is_wrong_as_a_whole(
     registry = ConverterRegistry()
     registry.register("batch_converter", Batch)
     with pytest.raises(ConverterError) as error:
-        Converter("batch", "cdr", registry).convert(MESSAGE, schema)
+        Converter("batch", "cdr", registry).convert_batch([MESSAGE], schema)
     assert str(error.value) == text
 
 
@@ -240,3 +256,19 @@ def test_many_threads(schema: Schema) -> None:
     for each in threads:
         each.join()
     assert results == [TEXT] * 800
+
+
+GARBAGE = st.binary(max_size=40)
+
+
+@pytest.mark.parametrize(
+    "formats",
+    [("cdr", "protobuf"), ("protobuf", "cdr"), ("ros1", "cdr"), ("json", "cdr"), ("protobuf", "json")],
+)
+@given(data=GARBAGE | GARBAGE.map(HEADER.__add__) | GARBAGE.map(b"\n".__add__))
+def test_garbage(formats: tuple[str, str], data: bytes, schema: Schema) -> None:
+    """Whatever the bytes are, only our errors come out."""
+    registry = ConverterRegistry()
+    registry.register("json_converter", JsonConverter)
+    [converted] = Converter(*formats, registry).convert_batch([SerializedBagMessage(data)], schema)
+    assert isinstance(converted, (SerializedBagMessage, ConversionError))

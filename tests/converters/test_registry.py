@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -80,6 +81,18 @@ def test_a_plugin_that_is_named() -> None:
     assert registry.load_serializer("json") is None
 
 
+def test_a_registry_in_another_process(installed: Installed) -> None:
+    registry = ConverterRegistry()
+    registry.register("a_converter", JsonDeserializer)
+    registry.load(f"{HERE}:JsonConverter")
+    assert registry.load_deserializer("installed") is None
+    installed("my-plugins", installed_converter=f"{HERE}:JsonConverter")
+    there = pickle.loads(pickle.dumps(registry))
+    assert type(there.load_deserializer("a")) is JsonDeserializer
+    assert type(there.load_serializer("json")) is JsonConverter
+    assert type(there.load_deserializer("installed")) is JsonConverter
+
+
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in(name: str) -> None:
     deserializer = ConverterRegistry().load_deserializer(name)
@@ -97,6 +110,7 @@ BROKEN = {
     " or SerializationFormatConverter",
     f"{HERE}:Unfinished": "the class lacks serialize",
     f"{HERE}:Failing": "ValueError: no licence",
+    "tests.converters.leaving_plugin:Class": "SystemExit: 1",
 }
 
 

@@ -1,0 +1,5 @@
+"""A module that cannot be imported, because it ends the program."""
+
+import sys
+
+sys.exit(1)
