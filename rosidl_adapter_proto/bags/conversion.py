@@ -127,14 +127,16 @@ class ConversionResult:
 
     Attributes:
         counts: What became of the messages of each topic, by its name.
-        failures: The first messages that cannot be converted, up to `SHOWN_FAILURES`; `counts` has all of them.
+        failures: The first messages that cannot be converted, up to `SHOWN_FAILURES`.
         warnings: What the user should know, such as what is odd about the source.
+        failed_count: How many messages cannot be converted; `failures` has the first of them.
         source_size: The size of the source in bytes.
         size: The size of the result in bytes.
     """
 
     counts: Mapping[str, Counts] = field(default_factory=dict)
     failures: Sequence[FailedMessage] = ()
+    failed_count: int = 0
     warnings: Sequence[str] = ()
     source_size: int = 0
     size: int = 0
@@ -144,12 +146,18 @@ class ConversionResult:
         """What became of all messages."""
         return sum(self.counts.values(), Counts())
 
+    @property
+    def is_complete(self) -> bool:
+        """Whether every message that was selected was read, and has the serialization format that was asked for."""
+        return not (self.failed_count or self.total.skipped or self.total.lost)
+
     def __add__(self, other: ConversionResult) -> ConversionResult:
         names = {**self.counts, **other.counts}
         none = Counts()
         return ConversionResult(
             {name: self.counts.get(name, none) + other.counts.get(name, none) for name in names},
             (*self.failures, *other.failures)[:SHOWN_FAILURES],
+            self.failed_count + other.failed_count,
             tuple(dict.fromkeys((*self.warnings, *other.warnings))),
             self.source_size + other.source_size,
             self.size + other.size,

@@ -18,7 +18,7 @@ from rosidl_adapter_proto.bags.output import check_new, written_aside
 from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFIXES, ZSTD_SUFFIX
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.routes import formats, selected_topics
-from rosidl_adapter_proto.converters import Converter, ConverterRegistry
+from rosidl_adapter_proto.converters import ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.time import to_nanoseconds
 
@@ -110,9 +110,6 @@ def _convert(
     _check_names([*settings.topics, *settings.excluded_topics], topics)
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
-    Converter(
-        source_format, target_format, settings.registry
-    )  # whether there is one, before anything is written
     size = sum(os.path.getsize(file.path) for file in recording.files)
     result = ConversionResult(warnings=recording.warnings, source_size=size)
     written: list[WrittenFile] = []
@@ -153,6 +150,8 @@ def _form(recording: Recording, destination: Path, settings: Settings) -> tuple[
         raise RequestError(f"storage {storage!r} cannot be written; {' and '.join(_WRITTEN)} can")
     if by_name not in (None, storage):
         raise RequestError(f"{destination} ends as a file of {by_name}, and the storage is to be {storage}")
+    if storage == SQLITE3 and settings.compression not in (None, "none"):
+        raise RequestError("files of sqlite3 are not compressed; leave --compression out, or write mcap")
     if by_name and len(recording.files) > 1:
         raise RequestError(
             f"{recording.path} has {len(recording.files)} files, each of which becomes one: "

@@ -19,9 +19,10 @@ from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import write_inner_metadata
 from rosidl_adapter_proto.bags.model import CDR, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.pipeline import map_in_order
-from rosidl_adapter_proto.bags.recorded_file import MCAP
+from rosidl_adapter_proto.bags.recorded_file import SQLITE3
 from rosidl_adapter_proto.bags.recording import Recording
 from rosidl_adapter_proto.bags.routes import Fate, plan_routes, selected_topics
+from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import StorageReader, StorageWriter
 from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.converters import Converter
@@ -81,29 +82,30 @@ def convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileRe
             written; or there are other numbers of messages than the file itself says.
     """
     salvage = task.settings.on_error is not OnError.STOP
-    with task.recording.open(task.index, salvage) as reader:
-        compression = _compression(task, reader)
-        # The profile makes CDR mandatory, and what cannot be converted may be copied.
-        profile = "ros2" if task.target_format == CDR and task.settings.on_error is not OnError.COPY else ""
-        with McapWriter(
-            task.destination.open("wb"), str(task.destination), profile=profile, compression=compression
-        ) as writer:
-            return _FileConversion(task, reader, writer).run(progress)
+    with task.recording.open(task.index, salvage) as reader, _open_writer(task, reader) as writer:
+        return _FileConversion(task, reader, writer).run(progress)
+
+
+def _open_writer(task: FileTask, reader: StorageReader) -> StorageWriter:
+    path, metadata = str(task.destination), task.recording.metadata
+    if task.storage == SQLITE3:
+        return SqliteWriter(path, ros_distro=metadata.ros_distro if metadata else "")
+    # The profile makes CDR mandatory, and what cannot be converted may be copied.
+    profile = "ros2" if task.target_format == CDR and task.settings.on_error is not OnError.COPY else ""
+    compression = _compression(task, reader)
+    return McapWriter(task.destination.open("wb"), path, profile=profile, compression=compression)
 
 
 def _compression(task: FileTask, reader: StorageReader) -> str:
     """Return how to compress: as the user says, or as the source is, whatever of it is compressed."""
-    asked = task.settings.compression
+    asked, metadata = task.settings.compression, task.recording.metadata
     if asked is not None:
         return "" if asked == "none" else asked
-    if task.storage != MCAP:
-        return ""
-    metadata = task.recording.metadata
     if task.recording.files[task.index].compressed or (metadata and metadata.compression_mode):
         return ZSTD
     try:
         first = next(reader.chunks(), None)
-    except BagError:  # who converts the chunks will say so
+    except BagError:  # those who convert the chunks will say so
         first = None
     return first.compression if first else ""
 
@@ -129,6 +131,8 @@ class _FileConversion:
     def run(self, progress: Callable[[int, int], None]) -> FileResult:
         """Convert everything."""
         warnings = label_warnings(self._reader, self._selected())
+        if self._writer.storage == SQLITE3 != self._reader.storage:
+            warnings.append("sqlite3 has no room for publish times and sequence numbers: they are left out")
         for topic_id, route in self._routes.items():
             if route.reason:
                 warnings.append(f"{route.reason}; its messages are {route.fate.value}")
@@ -140,7 +144,9 @@ class _FileConversion:
         statistics = self._writer.statistics
         self._writer.finish()
         warnings = [*self._reader.warnings, *self._types.warnings, *warnings, *self._ledger.warnings]
-        result = ConversionResult(counts, self._ledger.failures, tuple(dict.fromkeys(warnings)))
+        result = ConversionResult(
+            counts, self._ledger.failures, self._ledger.failed_count, tuple(dict.fromkeys(warnings))
+        )
         return FileResult(result, self._topics, statistics)
 
     def _selected(self) -> dict[int, Topic]:
@@ -217,10 +223,19 @@ class _FileConversion:
     def _copy_the_rest(self) -> None:
         """Copy what else is in the file, and describe the result as rosbag2 does."""
         for attachment in self._reader.attachments():
-            self._writer.add_attachment(attachment)
+            self._copy(partial(self._writer.add_attachment, attachment))
         for name, values in self._reader.metadata:
             if name not in (ROSBAG2, ROS_DEFINITIONS):
-                self._writer.add_metadata(name, values)
+                self._copy(partial(self._writer.add_metadata, name, values))
         file = WrittenFile(self._task.destination.name, self._topics, self._writer.statistics)
         metadata = describe(self._task.storage, [file], self._task.recording.metadata)
         self._writer.add_metadata(ROSBAG2, {"serialized_metadata": write_inner_metadata(metadata)})
+
+    def _copy(self, add: Callable[[], None]) -> None:
+        """Add something that the storage may have no room for."""
+        try:
+            add()
+        except BagError as error:
+            if self._task.settings.on_error is OnError.STOP:
+                raise BagError(f"{error}, or leave it out with `--on-error skip`") from None
+            self._ledger.warnings.append(f"{error}; it is left out")

@@ -39,6 +39,11 @@ class Ledger:
         self._chooses_times = settings.start_time > 0 or settings.end_time is not None
         self._failed: Counter[int] = Counter()
 
+    @property
+    def failed_count(self) -> int:
+        """How many messages could not be converted."""
+        return self._failed.total()
+
     def add_failures(self, failures: Sequence[FailureInChunk], written: Mapping[int, int]) -> None:
         """Note the messages of a chunk that could not be converted.
 

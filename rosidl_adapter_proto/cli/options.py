@@ -160,3 +160,19 @@ def _check_lock_file(options: Options) -> None:
             check_lock_file_is_used(options.numbering)
         except ValueError as error:
             raise RequestError(f"--lock-file {error}") from None
+
+
+def parse_time(value: str) -> int:
+    """Return a time that stands on the command line, in nanoseconds since 1970."""
+    if value.isascii() and value.isdigit():
+        return int(value)
+    try:
+        # Python reads Z since 3.11.
+        time = datetime.fromisoformat(value[:-1] + "+00:00" if value.endswith("Z") else value)
+    except ValueError:
+        raise click.BadParameter(
+            f"{value!r} is neither like 2026-05-01T12:00:00Z nor a number of nanoseconds since 1970"
+        ) from None
+    if time.tzinfo is None:
+        raise click.BadParameter(f"{value!r} has no time zone; write {value}Z for UTC")
+    return to_nanoseconds(time)
