@@ -21,6 +21,7 @@ from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.ros1 import Ros1Reader
 from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
@@ -82,7 +83,7 @@ def recognize(path: str) -> RecordedFile:
         if head.startswith(magic):
             return RecordedFile(path, storage, compressed)
     if not head:
-        raise BagError(f"{path}: empty")
+        raise BagError(f"{path}: {'cut off: nothing in it can be decompressed' if compressed else 'empty'}")
     raise BagError(f"{path}: neither MCAP nor sqlite3 nor a ROS 1 bag: it begins with {head.hex(' ')}")
 
 
@@ -150,21 +151,38 @@ def _decompressed(path: str, stack: ExitStack) -> str:
     target = Path(folder, Path(path).name.removesuffix(ZSTD_SUFFIX))
     room = shutil.disk_usage(folder).free - _SPARE_SPACE
     with open_file(path) as source, target.open("wb") as file:
-        try:
-            for piece in zstandard.ZstdDecompressor().read_to_iter(source):
-                room -= len(piece)
-                if room < 0:
-                    raise BagError(
-                        f"{path}: too large to be decompressed in {folder}; set TMPDIR to a larger disk"
-                    )
-                file.write(piece)
-        except zstandard.ZstdError as error:
-            raise BagError(f"{path}: damaged zstd, after {file.tell()} bytes: {error}") from None
+        for piece in _decompressed_pieces(source, path):
+            room -= len(piece)
+            if room < 0:
+                raise BagError(
+                    f"{path}: too large to be decompressed in {folder}; set TMPDIR to a larger disk"
+                )
+            file.write(piece)
     return str(target)
+
+
+def _decompressed_pieces(source: BinaryIO, path: str) -> Iterator[bytes]:
+    """Yield what the zstd frames of a file have, in pieces of at most 128 MiB: 2^15 times what is read for each."""
+    frame = zstandard.ZstdDecompressor().decompressobj()
+    while data := source.read(4096):
+        while data:
+            if frame.eof:
+                frame = zstandard.ZstdDecompressor().decompressobj()
+            try:
+                yield frame.decompress(data)
+            except zstandard.ZstdError as error:
+                raise BagError(f"{path}: damaged zstd before byte {source.tell()}: {error}") from None
+            data = frame.unused_data if frame.eof else b""
+    if not frame.eof:
+        raise BagError(f"{path}: cut off: its compressed data does not end at its last byte, {source.tell()}")
 
 
 def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
     return McapReader(open_file(path), name, salvage=salvage)
+
+
+def _open_ros1(path: str, name: str, salvage: bool) -> StorageReader:
+    return Ros1Reader(open_file(path), name, salvage=salvage)
 
 
 def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
@@ -174,6 +192,7 @@ def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
 _OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
     MCAP: _open_mcap,
     SQLITE3: _open_sqlite3,
+    ROSBAG: _open_ros1,
 }
 
 
@@ -209,7 +228,10 @@ class _OpenedFile:
     ) -> Iterator[StoredChunk]:
         for chunk in self._reader.chunks(selection, in_time_order=in_time_order):
             if self._messages_compressed:
-                yield from _with_plain_messages(chunk, selection)
+                # In the order of time, pieces of a chunk would have to stand between those of others.
+                yield from _with_plain_messages(
+                    chunk, selection, MAXIMUM_CHUNK_SIZE if in_time_order else _PIECE_SIZE
+                )
             else:
                 yield chunk
 
@@ -249,12 +271,12 @@ def _with_metadata(
         if differing:
             names = " and ".join(differing)
             contradictions.append(
-                f"{reader.path}: {topic.name}: {METADATA_FILE} has another {names}; the file counts"
+                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file"
             )
     return topics, contradictions
 
 
-def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[StoredChunk]:
+def _with_plain_messages(chunk: StoredChunk, selection: Selection, piece_size: int) -> Iterator[StoredChunk]:
     """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
     records = read_records(records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time)
     first = 0
@@ -263,8 +285,8 @@ def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[S
     for index in range(len(records)):
         messages.append(_decompressed_message(records, index, chunk.where))
         size += memoryview(messages[-1]).nbytes
-        if size >= _PIECE_SIZE or index == len(records) - 1:
-            yield _plain_chunk(records, first, messages, chunk.where)
+        if size >= piece_size or index == len(records) - 1:
+            yield _plain_chunk(chunk, records, first, messages)
             first, size, messages = index + 1, 0, []
 
 
@@ -280,10 +302,12 @@ def _decompressed_message(records: Records, index: int, where: str) -> bytes:
     return plain
 
 
-def _plain_chunk(records: Records, first: int, messages: list[Buffer], where: str) -> StoredChunk:
+def _plain_chunk(chunk: StoredChunk, records: Records, first: int, messages: list[Buffer]) -> StoredChunk:
     chosen = slice(first, first + len(messages))
     times = array("Q", records.log_times[chosen])
     data = pack_records(
         records.topic_ids[chosen], records.sequences[chosen], times, records.publish_times[chosen], messages
     )
-    return StoredChunk(where, data, "", len(data), 0, min(times), max(times), len(messages))
+    return StoredChunk(
+        chunk.where, data, "", len(data), 0, min(times), max(times), len(messages), chunk.position
+    )
