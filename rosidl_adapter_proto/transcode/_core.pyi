@@ -58,6 +58,9 @@ def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""
 
+class PooledMemory(Memory):
+    """Memory that is used again once nobody looks at it any more."""
+
 class RecordConverter:
     def __init__(self, routes: Sequence[tuple[int, str, int, Transcoder | None, int | None]]) -> None:
         """Take the routes: the topic id in the chunk, what to do, the topic id in the result, the transcoder, and the
@@ -65,7 +68,7 @@ class RecordConverter:
 
     def _convert(
         self, data: Buffer, start_time: int, end_time: int | None, /
-    ) -> tuple[Memory, int, list[tuple[int, int, int, int, TranscodeError]]]:
+    ) -> tuple[PooledMemory, int, list[tuple[int, int, int, int, TranscodeError]]]:
         """Return the new chunk, how many messages it has, and of those that failed topic id, log time, sequence number,
         index and error."""
 
