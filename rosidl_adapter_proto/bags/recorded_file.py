@@ -21,6 +21,7 @@ from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.ros1 import Ros1Reader
 from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
@@ -167,6 +168,10 @@ def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
     return McapReader(open_file(path), name, salvage=salvage)
 
 
+def _open_ros1(path: str, name: str, salvage: bool) -> StorageReader:
+    return Ros1Reader(open_file(path), name, salvage=salvage)
+
+
 def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
     return SqliteReader(path, name, salvage=salvage)
 
@@ -174,6 +179,7 @@ def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
 _OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
     MCAP: _open_mcap,
     SQLITE3: _open_sqlite3,
+    ROSBAG: _open_ros1,
 }
 
 
@@ -209,7 +215,10 @@ class _OpenedFile:
     ) -> Iterator[StoredChunk]:
         for chunk in self._reader.chunks(selection, in_time_order=in_time_order):
             if self._messages_compressed:
-                yield from _with_plain_messages(chunk, selection)
+                # In the order of time, pieces of a chunk would have to stand between those of others.
+                yield from _with_plain_messages(
+                    chunk, selection, MAXIMUM_CHUNK_SIZE if in_time_order else _PIECE_SIZE
+                )
             else:
                 yield chunk
 
@@ -249,12 +258,12 @@ def _with_metadata(
         if differing:
             names = " and ".join(differing)
             contradictions.append(
-                f"{reader.path}: {topic.name}: {METADATA_FILE} has another {names}; the file counts"
+                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file"
             )
     return topics, contradictions
 
 
-def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[StoredChunk]:
+def _with_plain_messages(chunk: StoredChunk, selection: Selection, piece_size: int) -> Iterator[StoredChunk]:
     """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
     records = read_records(records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time)
     first = 0
@@ -263,8 +272,8 @@ def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[S
     for index in range(len(records)):
         messages.append(_decompressed_message(records, index, chunk.where))
         size += memoryview(messages[-1]).nbytes
-        if size >= _PIECE_SIZE or index == len(records) - 1:
-            yield _plain_chunk(records, first, messages, chunk.where)
+        if size >= piece_size or index == len(records) - 1:
+            yield _plain_chunk(chunk, records, first, messages)
             first, size, messages = index + 1, 0, []
 
 
@@ -280,10 +289,12 @@ def _decompressed_message(records: Records, index: int, where: str) -> bytes:
     return plain
 
 
-def _plain_chunk(records: Records, first: int, messages: list[Buffer], where: str) -> StoredChunk:
+def _plain_chunk(chunk: StoredChunk, records: Records, first: int, messages: list[Buffer]) -> StoredChunk:
     chosen = slice(first, first + len(messages))
     times = array("Q", records.log_times[chosen])
     data = pack_records(
         records.topic_ids[chosen], records.sequences[chosen], times, records.publish_times[chosen], messages
     )
-    return StoredChunk(where, data, "", len(data), 0, min(times), max(times), len(messages))
+    return StoredChunk(
+        chunk.where, data, "", len(data), 0, min(times), max(times), len(messages), chunk.position
+    )
