@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from rosidl_adapter_proto.bags.conversion import Counts, OnError, Settings
@@ -11,9 +13,9 @@ from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
 from rosidl_adapter_proto.errors import BagError
 
 
-def ledger(said: int, fate: Fate = Fate.CONVERTED, **settings: object) -> Ledger:
+def ledger(said: int, fate: Fate = Fate.CONVERTED, **settings: Any) -> Ledger:
     routes = {1: TopicRoute(Topic("/a", "a/msg/A", "cdr"), fate)}
-    return Ledger("in.mcap", routes, {1: said}, Settings(**settings))  # type: ignore[arg-type]
+    return Ledger("in.mcap", routes, {1: said}, Settings(**settings))
 
 
 @pytest.mark.parametrize(
@@ -56,7 +58,7 @@ def test_some_are_lost(on_error: OnError) -> None:
 
 
 @pytest.mark.parametrize("times", [{"start_time": 1}, {"end_time": 0}])
-def test_what_is_at_other_times_is_not_lost(times: dict[str, object]) -> None:
+def test_what_is_at_other_times_is_not_lost(times: dict[str, Any]) -> None:
     assert ledger(5, **times).counts({1: 3}) == {"/a": Counts(converted=3, not_selected=2)}
     with pytest.raises(BagError, match="but 6 were found"):
         ledger(5, **times).counts({1: 6})
