@@ -97,6 +97,28 @@ class Transcoder:
     ) -> tuple[Buffer, int, bytes, dict[int, TranscodeError]]:
         """Return the same for the other direction."""
 
+class ColumnFiller:
+    def __init__(self, transcoder: Transcoder, layout: bytes, serialization: int) -> None:
+        """Take a type, its columns as `columns.pack_layout` packs them, and the place in `columns.SERIALIZATIONS`."""
+
+    @property
+    def rows(self) -> int:
+        """How many messages the columns have."""
+
+    def append(
+        self,
+        messages: Sequence[Buffer] | Buffer,
+        ranges: Buffer | None,
+        first: int,
+        maximum_rows: int,
+        maximum_bytes: int,
+    ) -> int:
+        """Append messages from `first` on until there are so many rows or bytes; return the index of the next one."""
+
+    def take(self) -> tuple[int, list[tuple[int, Memory | None, Memory]]]:
+        """Hand the columns over and begin anew: how many rows they have, and of each how many rows it has itself, its
+        offsets and its values."""
+
 class Codec(Generic[MessageT]):
     def __init__(self, transcoder: Transcoder, message_class: type[MessageT]) -> None: ...
     def to_cdr(self, message: MessageT, /) -> bytes:
