@@ -17,7 +17,7 @@ from google.protobuf.message import Message
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.decoding import Decode, decoder
 from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
-from rosidl_adapter_proto.bags.order import in_time_order
+from rosidl_adapter_proto.bags.order import Run, in_time_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.bags.types import BagTypes
@@ -141,19 +141,18 @@ class Bag:
 
     Attributes:
         path: The folder or the file.
+        recording: Its files, as they are stored.
 
     Args:
-        recording: Its files.
-        interfaces: Folders that have the definitions that the bag does not have.
+        recording: Its files, as they are stored.
+        include: Folders that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else.
     """
 
-    def __init__(
-        self, recording: Recording, interfaces: Iterable[Path] = (), distro: str | None = None
-    ) -> None:
+    def __init__(self, recording: Recording, include: Iterable[Path] = (), distro: str | None = None) -> None:
         self.path = recording.path
-        self._recording = recording
-        self._interfaces = tuple(interfaces)
+        self.recording = recording
+        self._include = tuple(include)
         self._distro = distro
         self._closed = False
 
@@ -218,7 +217,7 @@ class Bag:
     def types(self) -> BagTypes:
         """The types of all topics."""
         topics = (topic for file in self.files for topic in file.topics.values())
-        return BagTypes(topics, self._interfaces, self._distro)
+        return BagTypes(topics, self._include, self._distro)
 
     def schema(self, topic: str) -> Schema:
         """Return the type of a topic, as `TypeRegistry` has it.
@@ -260,17 +259,37 @@ class Bag:
         if isinstance(fields, str):
             raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
         names = frozenset(self.topics if topics is None else self._names(topics))
-        start_time = 0 if start is None else max(to_nanoseconds(start, "time"), 0)
-        end_time = None if end is None else max(to_nanoseconds(end, "time"), 0)
         chosen = None if fields is None else tuple(fields)
         if chosen is not None:
             for name in sorted(names):
                 decoder(self.topics[name], self.types, chosen)
-        return self._messages(names, start_time, end_time, chosen)
+        return self._messages(self.runs(names, start=start, end=end), chosen)
 
-    def _messages(
-        self, names: frozenset[str], start_time: int, end_time: int | None, fields: Sequence[str] | None
-    ) -> Iterator[BagMessage]:
+    def runs(
+        self, topics: Iterable[str], *, start: Time | None = None, end: Time | None = None
+    ) -> Iterator[tuple[StorageReader, Run]]:
+        """Return an iterator over the same messages as `messages`, many at a time and as they were recorded.
+
+        Args:
+            topics: The names of topics.
+            start: As for `messages`.
+            end: As for `messages`.
+
+        Returns:
+            For each run of messages, the open file that it is in and the run.
+
+        Raises:
+            BagError: There is no such topic; or, while messages are read, a file is damaged.
+            TypeError: A time is none.
+        """
+        names = frozenset(self._names(topics))
+        start_time = 0 if start is None else max(to_nanoseconds(start, "time"), 0)
+        end_time = None if end is None else max(to_nanoseconds(end, "time"), 0)
+        return self._runs(names, start_time, end_time)
+
+    def _runs(
+        self, names: frozenset[str], start_time: int, end_time: int | None
+    ) -> Iterator[tuple[StorageReader, Run]]:
         for index, file in enumerate(self.files):
             ids = frozenset(topic_id for topic_id, topic in file.topics.items() if topic.name in names)
             after = file.statistics.end_time < start_time
@@ -278,12 +297,11 @@ class Bag:
             if not ids or after or before:
                 continue
             self._check_open()
-            with self._recording.open(index) as reader:
-                yield from self._file_messages(reader, Selection(ids, start_time, end_time), fields)
+            with self.recording.open(index) as reader:
+                for run in self._file_runs(reader, Selection(ids, start_time, end_time)):
+                    yield reader, run
 
-    def _file_messages(
-        self, reader: StorageReader, selection: Selection, fields: Sequence[str] | None
-    ) -> Iterator[BagMessage]:
+    def _file_runs(self, reader: StorageReader, selection: Selection) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:
             self._check_open()
             try:
@@ -293,13 +311,20 @@ class Bag:
             except RecordsError as error:
                 raise BagError(f"{chunk.where}: {error}") from error
 
-        assert selection.topic_ids is not None  # all topics are named
-        sources = {topic_id: self._source(reader, topic_id, fields) for topic_id in selection.topic_ids}
-        for run in in_time_order(reader.chunks(selection, in_time_order=True), read):
+        return in_time_order(reader.chunks(selection, in_time_order=True), read)
+
+    def _messages(
+        self, runs: Iterator[tuple[StorageReader, Run]], fields: Sequence[str] | None
+    ) -> Iterator[BagMessage]:
+        sources: dict[tuple[str, int], _Source] = {}
+        for reader, run in runs:
             records = run.records
             data, ranges = records.data, records.ranges
             for i in run.indexes:
-                source = sources[records.topic_ids[i]]
+                key = reader.path, records.topic_ids[i]
+                if key not in sources:
+                    sources[key] = self._source(reader, key[1], fields)
+                source = sources[key]
                 yield BagMessage(
                     source.topic.name,
                     records.log_times[i],
@@ -318,8 +343,8 @@ class Bag:
     def _contents(self) -> tuple[Sequence[BagFile], Sequence[str]]:
         """The files, and what is odd about them; each is opened for it once."""
         self._check_open()
-        files, warnings = [], list(self._recording.warnings)
-        for reader in self._recording.readers():
+        files, warnings = [], list(self.recording.warnings)
+        for reader in self.recording.readers():
             files.append(BagFile(reader.path, reader.storage, reader.topics, reader.statistics))
             warnings.extend(reader.warnings)
         return tuple(files), tuple(dict.fromkeys(warnings))
@@ -350,14 +375,14 @@ class Bag:
 def open_bag(
     path: str | os.PathLike[str],
     *,
-    interfaces: Iterable[str | os.PathLike[str]] = (),
+    include: Iterable[str | os.PathLike[str]] = (),
     distro: str | None = None,
 ) -> Bag:
     """Open a bag for reading.
 
     Args:
         path: A folder of rosbag2, an `.mcap` or `.db3` file, or a ROS 1 `.bag`.
-        interfaces: Folders of packages that have the definitions that the bag does not have.
+        include: Folders of packages that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else; by default
             `$ROS_DISTRO`, else the newest.
 
@@ -367,6 +392,6 @@ def open_bag(
     Raises:
         BagError: There is no bag, or it cannot be read.
     """
-    bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in interfaces], distro)
+    bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in include], distro)
     bag.files  # noqa: B018  # what is wrong with a file is said here
     return bag
