@@ -138,7 +138,7 @@ def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Monkey
     line(Progress(1_000_000_000, 4_000_000_000, 5000))
     line.clear()
     assert capsys.readouterr().err == (
-        "\r  0%  0 messages, 0 B/s\x1b[K" "\r 25%  5000 messages, 50.0 MB/s, 1:00 left\x1b[K" "\r\x1b[K"
+        "\r  0%  0 messages, 0 B/s" "\r 25%  5000 messages, 50.0 MB/s, 1:00 left" "\r"
     )
 
 
