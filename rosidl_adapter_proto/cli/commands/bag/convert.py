@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rosidl_adapter_proto.cli.options import parse_time, plugin_option, source_options
+from rosidl_adapter_proto.cli.options import bag_source_options, plugin_option, time_options
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.conversion import ConversionResult, Progress
@@ -58,16 +58,7 @@ _UNITS = ("B", "kB", "MB", "GB", "TB")
     metavar="NAME",
     help="Leave out this topic, or those that fit a pattern. May be repeated.",
 )
-@click.option(
-    "--start",
-    type=parse_time,
-    default="0",
-    metavar="TIME",
-    help="Convert only what was recorded at this time or later.",
-)
-@click.option(
-    "--end", type=parse_time, metavar="TIME", help="Convert only what was recorded before this time."
-)
+@time_options
 @click.option(
     "--on-error",
     type=click.Choice(["stop", "skip", "copy"]),
@@ -83,13 +74,12 @@ _UNITS = ("B", "kB", "MB", "GB", "TB")
     help="On how many threads to convert; by default one for each processor.",
 )
 @plugin_option
-@source_options
+@bag_source_options
 def command(source: Path, destination: Path, **settings: Any) -> int:
     """Convert a bag to another serialization format.
 
     IN is a folder that rosbag2 has recorded, a file of one, or a ROS 1 bag. OUT must not exist: it becomes such a
-    folder, or a single file if its name ends in .mcap or .db3. Times are in ISO 8601 with a time zone, such as
-    2026-05-01T12:00:00Z, or in nanoseconds since 1970.
+    folder, or a single file if its name ends in .mcap or .db3.
 
     The exit code is 1 if OUT does not have all that it should: messages were left out or copied as they are, since they
     cannot be converted, or since IN is damaged.
