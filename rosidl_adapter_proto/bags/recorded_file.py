@@ -112,7 +112,7 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
     """
     with ExitStack() as stack:
         path = _decompressed(file.path, stack) if file.compressed else file.path
-        reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage))
+        reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage, stack))
         return _OpenedFile(reader, metadata, stack)
 
 
@@ -177,23 +177,24 @@ def _decompressed_pieces(source: BinaryIO, path: str) -> Iterator[bytes]:
         raise BagError(f"{path}: cut off: its compressed data does not end at its last byte, {source.tell()}")
 
 
-def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
-    return McapReader(open_file(path), name, salvage=salvage)
+def _open_mcap(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    return McapReader(stack.enter_context(open_file(path)), name, salvage=salvage)
 
 
-def _open_ros1(path: str, name: str, salvage: bool) -> StorageReader:
-    return Ros1Reader(open_file(path), name, salvage=salvage)
+def _open_ros1(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    return Ros1Reader(stack.enter_context(open_file(path)), name, salvage=salvage)
 
 
-def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
+def _open_sqlite3(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
     return SqliteReader(path, name, salvage=salvage)
 
 
-_OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
+_OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {
     MCAP: _open_mcap,
     SQLITE3: _open_sqlite3,
     ROSBAG: _open_ros1,
 }
+"""Open a file, which the stack closes, also if it turns out that it cannot be read."""
 
 
 class _OpenedFile:
