@@ -14,8 +14,9 @@ import pytest
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, JOINT_STATES, SMALL_IMAGE, START, TF, Recorded, record
 from rosidl_adapter_proto import BagError, SchemaError, adapter_for, open_bag
-from rosidl_adapter_proto.bags.bag import Bag, BagMessage
+from rosidl_adapter_proto.bags.bag import Bag
 from rosidl_adapter_proto.bags.convert import convert_bag
+from rosidl_adapter_proto.bags.message import BagMessage
 from rosidl_adapter_proto.time import to_datetime, to_nanoseconds
 from tests.bags.values import assert_same_values
 
@@ -434,6 +435,25 @@ def test_only_chunks_that_overlap_are_in_memory(tmp_path: Path) -> None:
         tracemalloc.stop()
     assert path.stat().st_size > 10_000_000
     assert peak < 2_000_000
+
+
+def test_a_topic_of_several_types(tmp_path: Path) -> None:
+    other = bag_maker.Stream("/imu", "sensor_msgs/msg/JointState", 50, bag_maker.joint_state)
+    path = tmp_path / "bag.mcap"
+    bag_maker.write_mcap(path, record([IMU, other], 0.02))
+    bag = open_bag(path)
+
+    assert bag.topics["/imu"].message_count == bag.message_count == 5
+    assert bag.warnings == [
+        f"{path}: topic /imu has several types: sensor_msgs/msg/Imu, sensor_msgs/msg/JointState"
+    ]
+    assert [type(each.message).__name__ for each in bag.messages()] == [
+        "Imu",
+        "JointState",
+        "Imu",
+        "Imu",
+        "Imu",
+    ]
 
 
 def test_another_serialization_format(tmp_path: Path) -> None:
