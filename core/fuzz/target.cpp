@@ -13,6 +13,7 @@
 #include <memory>
 #include <vector>
 
+#include "columns.hpp"
 #include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
@@ -169,6 +170,7 @@ std::vector<Plan> read_plans() {
 void run(const Plan& plan, bool is_cdr, Input message) {
   round_trip(plan, is_cdr, message);
   is_cdr ? change(plan, message) : change_proto(plan, message);
+  fuzz_columns(plan, message, check);
   const uint64_t number = 1;
   Slice slice;
   const uint8_t* const end = message.data + message.size;

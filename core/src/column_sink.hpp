@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "cdr.hpp"
 #include "rosidl_adapter_proto/columns.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 #include "sink.hpp"
@@ -15,15 +16,15 @@
 namespace rosidl_proto {
 namespace {
 
-// Makes room for `size` more bytes; `total` is the capacity of all columns.
-ROSIDL_PROTO_NO_INLINE inline Reason grow(Memory& memory, uint64_t size, uint64_t* total) {
+// Makes room for `size` more bytes.
+ROSIDL_PROTO_NO_INLINE inline Reason grow(Memory& memory, uint64_t size, ColumnRoom& room) {
   constexpr uint64_t kFirst = 64;
-  const uint64_t needed = memory.size() + size, others = *total - memory.capacity();
-  if (needed > kMaximumColumn || others + needed > kMaximumColumns) return Reason::ColumnsFull;
-  const uint64_t most = std::min(kMaximumColumn, kMaximumColumns - others);
+  const uint64_t needed = memory.size() + size, others = room.taken - memory.capacity();
+  const uint64_t most = std::min(room.limit, 2 * room.limit - std::min(others, 2 * room.limit));
+  if (needed > most) return Reason::ColumnsFull;
   const uint64_t capacity = std::min(std::max({needed, memory.capacity() * 2, kFirst}), most);
-  if (!memory.grow(capacity)) return Reason::OutOfMemory;
-  *total = others + capacity;
+  if (!memory.grow(std::max<uint64_t>(capacity, 1))) return Reason::OutOfMemory;
+  room.taken = others + memory.capacity();
   return Reason::None;
 }
 
@@ -36,7 +37,7 @@ class ColumnSink : public Stop {
     At at;
   };
 
-  explicit ColumnSink(uint64_t* capacity) : capacity_(capacity) {}
+  explicit ColumnSink(ColumnRoom& room) : room_(room) {}
 
   static bool failed(At at) { return at == nullptr; }
   static At failure() { return nullptr; }
@@ -83,9 +84,12 @@ class ColumnSink : public Stop {
   }
 
   At elements(const Operation& op, At at, uint64_t count) {
+    // What takes no memory still takes time.
+    if (at->hollow && count > without_bytes_) return stop(Reason::ColumnsFull);
+    if (at->hollow) without_bytes_ -= count;
     if (op.shape == Shape::Sequence) {
       const uint64_t before = load_little<uint32_t>(end_of(at->offsets) - sizeof(uint32_t));
-      if (before + count > kMaximumColumn) return stop(Reason::ColumnsFull);
+      if (before + count > room_.limit) return stop(Reason::ColumnsFull);
       if (!put(at->offsets, static_cast<uint32_t>(before + count))) return nullptr;
     }
     at->left = static_cast<uint32_t>(count);
@@ -128,7 +132,7 @@ class ColumnSink : public Stop {
  private:
   At stop(Reason why) {
     reason = why;
-    detail = why == Reason::ColumnsFull ? kMaximumColumn : 0;
+    detail = why == Reason::ColumnsFull ? room_.limit : 0;
     return nullptr;
   }
 
@@ -137,7 +141,7 @@ class ColumnSink : public Stop {
   // Returns the place for `size` bytes behind what there is.
   ROSIDL_PROTO_INLINE uint8_t* room(Memory& memory, uint64_t size) {
     if (size > memory.capacity() - memory.size()) {
-      const Reason why = grow(memory, size, capacity_);
+      const Reason why = grow(memory, size, room_);
       if (why != Reason::None) return stop(why), nullptr;
     }
     uint8_t* const place = end_of(memory);
@@ -185,7 +189,8 @@ class ColumnSink : public Stop {
     return op.shape == Shape::Single || --at[-1].left == 0 ? behind : at;
   }
 
-  uint64_t* const capacity_;
+  ColumnRoom& room_;
+  uint64_t without_bytes_ = kMaximumWithoutBytes;  // elements that may still come
 };
 
 }  // namespace

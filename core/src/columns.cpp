@@ -1,5 +1,6 @@
 #include "rosidl_adapter_proto/columns.hpp"
 
+#include <algorithm>
 #include <exception>
 
 #include "cdr_reader.hpp"
@@ -97,7 +98,10 @@ const char* Columns::add_field(const Operation& op, const uint8_t** layout, cons
   const size_t index = columns_.size();
   push(ColumnKind::List, 0, op.shape == Shape::Array ? op.count : Column::kVariable);
   const char* const wrong = add_element(op, layout, end);
-  columns_[index].span = static_cast<uint32_t>(columns_.size() - index);
+  Column& list = columns_[index];
+  list.span = static_cast<uint32_t>(columns_.size() - index);
+  list.hollow = std::all_of(columns_.begin() + static_cast<std::ptrdiff_t>(index), columns_.end(),
+                            [](const Column& each) { return each.fixed() && each.width == 0; });
   return wrong;
 }
 
@@ -148,18 +152,18 @@ void Columns::find_variable(size_t first, size_t last, uint64_t values) {
 
 // Takes memory for the first rows: as much as a batch before this one took, if there is so much.
 bool Columns::prepare(const std::vector<Column>* before) {
-  rows_ = capacity_ = 0;
+  rows_ = room_.taken = 0;
   for (size_t i = 0; i < columns_.size(); ++i) {
     Column& column = columns_[i];
     const Column* const model = before == nullptr ? nullptr : &(*before)[i];
     const uint64_t expected = model == nullptr ? 0 : model->values.size();
     // A place to begin with; what could be more comes when it is needed.
-    if (grow(column.values, expected, &capacity_) != Reason::None &&
-        grow(column.values, 0, &capacity_) != Reason::None)
+    if (column.width != 0 && grow(column.values, expected, room_) != Reason::None &&
+        grow(column.values, 0, room_) != Reason::None)
       return false;
     if (column.fixed()) continue;
     const uint64_t size = model == nullptr ? sizeof(uint32_t) : model->offsets.size();
-    if (grow(column.offsets, size, &capacity_) != Reason::None) return false;
+    if (grow(column.offsets, size, room_) != Reason::None) return false;
     store_little(column.offsets.data(), uint32_t{0});
     column.offsets.cut(sizeof(uint32_t));
   }
@@ -179,7 +183,7 @@ bool Columns::append(Serialization serialization, Input message, Error& error) n
 bool Columns::run(Serialization serialization, Input message, Error& error) {
   uint8_t nothing;
   if (message.size == 0) message.data = &nothing;  // a place that is nowhere is an error
-  const ColumnSink sink(&capacity_);
+  const ColumnSink sink(room_);
   Column* at = columns_.data();
   switch (serialization) {
     case Serialization::Cdr: {
@@ -223,12 +227,12 @@ bool Columns::take(std::vector<Column>* taken) noexcept {
   } catch (const std::exception&) {
     return false;
   }
-  const uint64_t rows = rows_, capacity = capacity_;
+  const uint64_t rows = rows_, room = room_.taken;
   columns_.swap(fresh);
   if (!prepare(&fresh)) {
     columns_.swap(fresh);
     rows_ = rows;
-    capacity_ = capacity;
+    room_.taken = room;
     return false;
   }
   fresh.pop_back();

@@ -111,8 +111,11 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
         BagError: It cannot be read.
     """
     with ExitStack() as stack:
-        path = _decompressed(file.path, stack) if file.compressed else file.path
-        reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage, stack))
+        try:
+            path = _decompressed(file.path, stack) if file.compressed else file.path
+            reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage, stack))
+        except OSError as error:  # also of temporary files, such as that the disk is full
+            raise BagError(f"{file.path}: cannot be opened: {error}") from None
         return _OpenedFile(reader, metadata, stack)
 
 

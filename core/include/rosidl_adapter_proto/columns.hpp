@@ -31,15 +31,20 @@ enum class ColumnKind : uint8_t {
 enum class Serialization : uint8_t { Cdr, Protobuf, Ros1 };
 constexpr uint8_t kSerializations = 3;
 
-// No buffer has more bytes than offsets of 32 bits can tell, and all buffers of a batch together not more
-// than twice that.
+// No buffer has more bytes than offsets of 32 bits can tell.
 constexpr uint64_t kMaximumColumn = 0x7fffffff;
-constexpr uint64_t kMaximumColumns = 2 * kMaximumColumn;
+
+// How much memory columns may take: each of them, and together not more than twice that.
+struct ColumnRoom {
+  uint64_t limit;
+  uint64_t taken = 0;
+};
 
 struct Column {
   static constexpr uint32_t kVariable = 0xffffffff;
 
   ColumnKind kind = ColumnKind::Struct;
+  bool hollow = false;   // nothing inside of it takes any bytes
   bool boolean = false;  // numbers are booleans, which Arrow has as bits
   uint32_t width = 0;    // in bytes, of a value; 0 if what there is lies in other columns
   uint32_t length = 1;   // in values, of a row
@@ -55,6 +60,7 @@ struct Column {
   Column empty() const {
     Column column;
     column.kind = kind;
+    column.hollow = hollow;
     column.boolean = boolean;
     column.width = width;
     column.length = length;
@@ -65,6 +71,9 @@ struct Column {
 
 class Columns {
  public:
+  // No column gets more bytes than `limit`, which is at most kMaximumColumn.
+  explicit Columns(uint64_t limit = kMaximumColumn) : room_{limit} {}
+
   // Reads a layout. Returns nullptr, or what is wrong with it. The plan stays where it is.
   const char* load(const Plan& plan, const uint8_t* layout, size_t size) noexcept;
 
@@ -99,7 +108,7 @@ class Columns {
   std::vector<uint32_t> variable_;  // the columns whose size does not follow from the number of rows
   uint64_t row_bytes_ = 0;          // of all other columns
   uint64_t rows_ = 0;
-  uint64_t capacity_ = 0;  // of all columns
+  ColumnRoom room_;
 };
 
 }  // namespace rosidl_proto

@@ -87,7 +87,7 @@ def command(source: Path, destination: Path, **settings: Any) -> int:
     from rosidl_adapter_proto.bags.convert import convert_bag
 
     started = time.monotonic()
-    progress = _ProgressLine(started) if sys.stderr.isatty() else None
+    progress = ProgressLine(started) if sys.stderr.isatty() else None
     try:
         result = convert_bag(source, destination, progress=progress, **settings)
     finally:
@@ -100,7 +100,7 @@ def command(source: Path, destination: Path, **settings: Any) -> int:
     return 0 if result.is_complete else EXIT_INCOMPLETE
 
 
-class _ProgressLine:
+class ProgressLine:
     """One line on the terminal, with the rate and the time that is left."""
 
     def __init__(self, started: float) -> None:
@@ -112,15 +112,11 @@ class _ProgressLine:
         if now - self._drawn < _REDRAWN_AFTER:
             return
         self._drawn = now
+        rate = progress.done / (now - self._started)
+        left = f", {time_text((progress.total - progress.done) / rate)} left" if rate else ""
         share = progress.done / progress.total if progress.total else 1.0
-        elapsed = now - self._started
-        left = elapsed / share - elapsed if share else 0.0
-        click.echo(
-            f"\r{share:4.0%}  {progress.message_count} messages, {size_text(progress.done / elapsed)}/s, "
-            f"{time_text(left)} left\x1b[K",
-            nl=False,
-            err=True,
-        )
+        text = f"{share:4.0%}  {progress.message_count} messages, {size_text(rate)}/s{left}"
+        click.echo(f"\r{text}\x1b[K", nl=False, err=True)
 
     def clear(self) -> None:
         """Take the line away."""
@@ -152,12 +148,13 @@ def size_text(size: float) -> str:
     while size >= 1000 and unit < len(_UNITS) - 1:
         size /= 1000
         unit += 1
-    return f"{size:.0f} {_UNITS[unit]}" if unit == 0 or size >= 100 else f"{size:.1f} {_UNITS[unit]}"
+    digits = 0 if unit == 0 or size >= 99.95 else 1
+    return f"{size:.{digits}f} {_UNITS[unit]}"
 
 
 def time_text(seconds: float) -> str:
     """Return a duration as people read it."""
-    if seconds < 60:
+    if seconds < 59.95:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
