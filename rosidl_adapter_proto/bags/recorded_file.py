@@ -111,8 +111,11 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
         BagError: It cannot be read.
     """
     with ExitStack() as stack:
-        path = _decompressed(file.path, stack) if file.compressed else file.path
-        reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage))
+        try:
+            path = _decompressed(file.path, stack) if file.compressed else file.path
+            reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage, stack))
+        except OSError as error:  # also of temporary files, such as that the disk is full
+            raise BagError(f"{file.path}: cannot be opened: {error}") from None
         return _OpenedFile(reader, metadata, stack)
 
 
@@ -177,19 +180,19 @@ def _decompressed_pieces(source: BinaryIO, path: str) -> Iterator[bytes]:
         raise BagError(f"{path}: cut off: its compressed data does not end at its last byte, {source.tell()}")
 
 
-def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
-    return McapReader(open_file(path), name, salvage=salvage)
+def _open_mcap(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    return McapReader(stack.enter_context(open_file(path)), name, salvage=salvage)
 
 
-def _open_ros1(path: str, name: str, salvage: bool) -> StorageReader:
-    return Ros1Reader(open_file(path), name, salvage=salvage)
+def _open_ros1(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    return Ros1Reader(stack.enter_context(open_file(path)), name, salvage=salvage)
 
 
-def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
+def _open_sqlite3(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
     return SqliteReader(path, name, salvage=salvage)
 
 
-_OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
+_OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {
     MCAP: _open_mcap,
     SQLITE3: _open_sqlite3,
     ROSBAG: _open_ros1,

@@ -10,11 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
+from rosidl_adapter_proto.bags.metadata import MAXIMUM_SIZE, METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.recorded_file import (
     SUFFIXES,
     ZSTD_SUFFIX,
     RecordedFile,
+    open_file,
     open_reader,
     recognize,
 )
@@ -86,7 +87,7 @@ def _folder(folder: Path) -> Recording:
     present = sorted(
         path for path in folder.iterdir() if Path(_plain_name(path)).suffix in SUFFIXES and path.is_file()
     )
-    metadata = read_metadata(place.read_bytes(), str(place)) if place.is_file() else None
+    metadata = _read_metadata(place)
     if metadata is not None and metadata.paths:
         return _listed_files(folder, metadata, present)
     if not present:
@@ -142,11 +143,18 @@ def _by_start_time(files: list[RecordedFile]) -> list[RecordedFile]:
 def _metadata_beside(path: Path) -> tuple[BagMetadata | None, tuple[str, ...]]:
     """Return the metadata in the folder of a file, if it is about that file."""
     place = path.parent / METADATA_FILE
-    if not place.is_file():
-        return None, ()
     try:
-        metadata = read_metadata(place.read_bytes(), str(place))
+        metadata = _read_metadata(place)
     except BagError as error:
         return None, (f"{error} (read without it)",)
+    if metadata is None:
+        return None, ()
     names = {_plain_name(Path(name)) for name in metadata.paths}
     return (metadata if _plain_name(path) in names else None), ()
+
+
+def _read_metadata(place: Path) -> BagMetadata | None:
+    if not place.is_file():
+        return None
+    with open_file(str(place)) as file:
+        return read_metadata(file.read(MAXIMUM_SIZE + 1), str(place))

@@ -344,6 +344,19 @@ def test_a_disk_without_room_for_a_decompressed_file_is_said(
         _read(path)
 
 
+def test_a_full_disk_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = database(tmp_path / "a.db3")
+    Path(f"{path}-journal").write_bytes(b"something")
+
+    def full(*arguments: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("shutil.copyfile", full)
+    with pytest.raises(BagError) as caught:
+        _read(path)
+    assert str(caught.value) == f"{path}: cannot be opened: [Errno 28] No space left on device"
+
+
 def test_files_are_created_by_the_name_of_their_storage(tmp_path: Path) -> None:
     for storage, name in (("mcap", "a.mcap"), ("sqlite3", "a.db3")):
         with create_file(str(tmp_path / name), storage) as writer:

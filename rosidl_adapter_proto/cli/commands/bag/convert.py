@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rosidl_adapter_proto.cli.options import parse_time, plugin_option, source_options
+from rosidl_adapter_proto.cli.options import bag_source_options, plugin_option, time_options
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.conversion import ConversionResult, Progress
@@ -58,16 +58,7 @@ _UNITS = ("B", "kB", "MB", "GB", "TB")
     metavar="NAME",
     help="Leave out this topic, or those that fit a pattern. May be repeated.",
 )
-@click.option(
-    "--start",
-    type=parse_time,
-    default="0",
-    metavar="TIME",
-    help="Convert only what was recorded at this time or later.",
-)
-@click.option(
-    "--end", type=parse_time, metavar="TIME", help="Convert only what was recorded before this time."
-)
+@time_options
 @click.option(
     "--on-error",
     type=click.Choice(["stop", "skip", "copy"]),
@@ -83,13 +74,12 @@ _UNITS = ("B", "kB", "MB", "GB", "TB")
     help="On how many threads to convert; by default one for each processor.",
 )
 @plugin_option
-@source_options
+@bag_source_options
 def command(source: Path, destination: Path, **settings: Any) -> int:
     """Convert a bag to another serialization format.
 
     IN is a folder that rosbag2 has recorded, a file of one, or a ROS 1 bag. OUT must not exist: it becomes such a
-    folder, or a single file if its name ends in .mcap or .db3. Times are in ISO 8601 with a time zone, such as
-    2026-05-01T12:00:00Z, or in nanoseconds since 1970.
+    folder, or a single file if its name ends in .mcap or .db3.
 
     The exit code is 1 if OUT does not have all that it should: messages were left out or copied as they are, since they
     cannot be converted, or since IN is damaged.
@@ -97,7 +87,7 @@ def command(source: Path, destination: Path, **settings: Any) -> int:
     from rosidl_adapter_proto.bags.convert import convert_bag
 
     started = time.monotonic()
-    progress = _ProgressLine(started) if sys.stderr.isatty() else None
+    progress = ProgressLine(started) if sys.stderr.isatty() else None
     try:
         result = convert_bag(source, destination, progress=progress, **settings)
     finally:
@@ -110,7 +100,7 @@ def command(source: Path, destination: Path, **settings: Any) -> int:
     return 0 if result.is_complete else EXIT_INCOMPLETE
 
 
-class _ProgressLine:
+class ProgressLine:
     """One line on the terminal, with the rate and the time that is left."""
 
     def __init__(self, started: float) -> None:
@@ -122,15 +112,11 @@ class _ProgressLine:
         if now - self._drawn < _REDRAWN_AFTER:
             return
         self._drawn = now
+        rate = progress.done / (now - self._started)
+        left = f", {time_text((progress.total - progress.done) / rate)} left" if rate else ""
         share = progress.done / progress.total if progress.total else 1.0
-        elapsed = now - self._started
-        left = elapsed / share - elapsed if share else 0.0
-        click.echo(
-            f"\r{share:4.0%}  {progress.message_count} messages, {size_text(progress.done / elapsed)}/s, "
-            f"{time_text(left)} left\x1b[K",
-            nl=False,
-            err=True,
-        )
+        text = f"{share:4.0%}  {progress.message_count} messages, {size_text(rate)}/s{left}"
+        click.echo(f"\r{text}\x1b[K", nl=False, err=True)
 
     def clear(self) -> None:
         """Take the line away."""
@@ -162,12 +148,13 @@ def size_text(size: float) -> str:
     while size >= 1000 and unit < len(_UNITS) - 1:
         size /= 1000
         unit += 1
-    return f"{size:.0f} {_UNITS[unit]}" if unit == 0 or size >= 100 else f"{size:.1f} {_UNITS[unit]}"
+    digits = 0 if unit == 0 or size >= 99.95 else 1
+    return f"{size:.{digits}f} {_UNITS[unit]}"
 
 
 def time_text(seconds: float) -> str:
     """Return a duration as people read it."""
-    if seconds < 60:
+    if seconds < 59.95:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
