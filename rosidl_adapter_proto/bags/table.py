@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import array
 import os
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -101,6 +101,7 @@ def write_table(
     fields: Iterable[str] | None = None,
     start: Time | None = None,
     end: Time | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> int:
     """Write the messages of a topic to a file, which appears when it is complete.
 
@@ -113,6 +114,7 @@ def write_table(
         fields: As for `table_reader`.
         start: As for `table_reader`.
         end: As for `table_reader`.
+        progress: Called with a number of rows once they are written.
 
     Returns:
         The number of rows.
@@ -132,6 +134,8 @@ def write_table(
         for batch in reader:
             table.write(batch)
             count += batch.num_rows
+            if progress is not None:
+                progress(batch.num_rows)
     return count
 
 
