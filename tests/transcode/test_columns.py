@@ -317,6 +317,13 @@ def test_other_formats() -> None:
     )
 
 
+def test_sizes_of_record_batches() -> None:
+    for limit in ("maximum_rows", "maximum_bytes"):
+        arguments: Any = {limit: 0}
+        with pytest.raises(ValueError, match="maximum_rows and maximum_bytes must be 1 or more"):
+            ColumnReader(schema_of(STRING, "test/msg/String"), **arguments)
+
+
 def test_too_many_columns() -> None:
     types = struct_type("test/msg/D0", **{f"f{i}": "int32" for i in range(100)})
     types |= struct_type("test/msg/D1", **{f"f{i}": "test/msg/D0" for i in range(100)})
