@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 LOG_TIME = "log_time"
 PUBLISH_TIME = "publish_time"
 
+_THREADS = min(4, os.cpu_count() or 1)  # decompressing keeps no more of them busy while one fills columns
+
 
 def table_reader(
     bag: Bag | str | os.PathLike[str],
@@ -64,7 +66,7 @@ def table_reader(
         TypeError: A time is none, or `fields` is one text.
     """
     bag = bag if isinstance(bag, Bag) else open_bag(bag)
-    runs = bag.runs([topic], start=start, end=end)
+    runs = bag.runs([topic], start=start, end=end, threads=_THREADS)
     rows = _Rows(bag, topic, fields, maximum_rows, maximum_bytes)
     return pa.RecordBatchReader.from_batches(rows.arrow_schema, rows.record_batches(runs))
 
