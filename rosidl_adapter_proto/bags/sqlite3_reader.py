@@ -7,6 +7,7 @@ files in the wild mix them. Protobuf bags have a table of our own, `protobuf_des
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -125,6 +126,8 @@ class SqliteReader:
         place = f"file:{quote(str(self._recovered(path, stack).absolute()))}?mode=ro&immutable=1"
         connection = sqlite3.connect(place, uri=True, check_same_thread=False)
         stack.callback(connection.close)
+        if self._salvage:  # else sqlite reads nothing of a file that has lost its end
+            connection.execute("PRAGMA writable_schema = ON")
         connection.text_factory = bytes  # names may be anything; they are decoded with errors that say where
         return connection
 
@@ -134,7 +137,7 @@ class SqliteReader:
         beside = [Path(f"{path}{suffix}") for suffix in ("-wal", "-journal")]
         journals = [journal for journal in beside if journal.is_file() and journal.stat().st_size]
         if not journals:
-            return path
+            return self._whole_pages(path, stack) if self._salvage else path
         names = " and ".join(journal.name for journal in journals)
         self.warnings.append(
             f"{self.path}: its recorder did not finish; {names} beside it was read too, from a copy"
@@ -153,11 +156,30 @@ class SqliteReader:
             connection.close()
         return folder / path.name
 
+    def _whole_pages(self, path: Path, stack: ExitStack) -> Path:
+        """Return the file, or a copy without the page in which it was cut off: sqlite would fill it up with zeros."""
+        with path.open("rb") as file:
+            head, size = file.read(18), path.stat().st_size
+            page_size = int.from_bytes(head[16:18], "big")
+            page_size = (
+                2**16 if page_size == 1 else max(page_size, 512)
+            )  # https://sqlite.org/fileformat.html#page_size
+            if size % page_size == 0:
+                return path
+            self._note(
+                f"{self.path}: cut off in the page of {page_size} bytes that is its last; it is left out"
+            )
+            copy = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-")), path.name)
+            shutil.copyfile(path, copy)
+        os.truncate(copy, size - size % page_size)
+        return copy
+
     def _query(self, query: str) -> list[tuple[Any, ...]]:
         try:
             return self._connection.execute(query).fetchall()
         except _ERRORS as error:
-            raise BagError(f"{self.path}: {_reason(error)}") from None
+            advice = "; `--on-error skip` reads what is whole" if "malformed" in str(error) else ""
+            raise BagError(f"{self.path}: {_reason(error)}{advice}") from None
 
     def _tables(self) -> list[str]:
         names = [name for (name,) in self._query("SELECT name FROM sqlite_master WHERE type = 'table'")]

@@ -341,6 +341,26 @@ def test_a_damaged_database_is_salvaged(tmp_path: Path) -> None:
         assert reader.statistics.message_count == 1986
 
 
+def test_a_database_that_lost_its_end_is_salvaged(tmp_path: Path) -> None:
+    path = database(tmp_path / "a.db3", rows=LARGE_ROWS)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2 + 100])
+    with pytest.raises(BagError) as caught:
+        SqliteReader(str(path))
+    assert str(caught.value) == (
+        f"{path}: sqlite3 says: database disk image is malformed; `--on-error skip` reads what is whole"
+    )
+    with SqliteReader(str(path), salvage=True) as reader:
+        rows = rows_of(reader)
+        assert len(rows) > 500 and rows == list(LARGE_ROWS[: len(rows)]) and reader.is_damaged
+        assert reader.statistics.message_count == len(rows)
+        assert reader.warnings == [
+            f"{path}: cut off in the page of 4096 bytes that is its last; it is left out",
+            f"{path}: table messages, rows {len(rows) + 1} on are left out: "
+            "sqlite3 says: database disk image is malformed",
+        ]
+
+
 @pytest.fixture(scope="module")
 def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return database(tmp_path_factory.mktemp("sample") / "a.db3", rows=ROWS[:8])
