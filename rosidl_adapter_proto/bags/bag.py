@@ -16,6 +16,7 @@ from rosidl_adapter_proto.bags.decoding import decoder
 from rosidl_adapter_proto.bags.message import BagMessage, MessageSource
 from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.order import Run, in_time_order
+from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.bags.types import BagTypes
@@ -27,6 +28,10 @@ from rosidl_adapter_proto.transcode.records import Records, read_records
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.time import Time
+
+
+_READ_AHEAD = 64 * 2**20
+"""So many bytes of chunks are read before somebody needs them, unless one is larger."""
 
 
 @dataclass(frozen=True)
@@ -188,7 +193,12 @@ class Bag:
         return self._messages(self.runs(names, start=start, end=end), chosen)
 
     def runs(
-        self, topics: Iterable[str], *, start: Time | None = None, end: Time | None = None
+        self,
+        topics: Iterable[str],
+        *,
+        start: Time | None = None,
+        end: Time | None = None,
+        threads: int = 1,
     ) -> Iterator[tuple[StorageReader, Run]]:
         """Return an iterator over the same messages as `messages`, many at a time and as they were recorded.
 
@@ -196,6 +206,8 @@ class Bag:
             topics: The names of topics.
             start: As for `messages`.
             end: As for `messages`.
+            threads: On how many threads chunks are decompressed, ahead of who takes the messages; with one, when they
+                are needed.
 
         Returns:
             For each run of messages, the open file that it is in and the run.
@@ -207,10 +219,10 @@ class Bag:
         names = frozenset(self._names(topics))
         start_time = 0 if start is None else max(to_nanoseconds(start, "time"), 0)
         end_time = None if end is None else max(to_nanoseconds(end, "time"), 0)
-        return self._runs(names, start_time, end_time)
+        return self._runs(names, start_time, end_time, threads)
 
     def _runs(
-        self, names: frozenset[str], start_time: int, end_time: int | None
+        self, names: frozenset[str], start_time: int, end_time: int | None, threads: int
     ) -> Iterator[tuple[StorageReader, Run]]:
         for index, file in enumerate(self.files):
             ids = frozenset(topic_id for topic_id, topic in file.topics.items() if topic.name in names)
@@ -220,10 +232,10 @@ class Bag:
                 continue
             self._check_open()
             with self.recording.open(index) as reader:
-                for run in self._file_runs(reader, Selection(ids, start_time, end_time)):
+                for run in self._file_runs(reader, Selection(ids, start_time, end_time), threads):
                     yield reader, run
 
-    def _file_runs(self, reader: StorageReader, selection: Selection) -> Iterator[Run]:
+    def _file_runs(self, reader: StorageReader, selection: Selection, threads: int) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:
             self._check_open()
             try:
@@ -233,7 +245,22 @@ class Bag:
             except RecordsError as error:
                 raise BagError(f"{chunk.where}: {error}") from error
 
-        return in_time_order(reader.chunks(selection, in_time_order=True), read)
+        chunks = reader.chunks(selection, in_time_order=True)
+        if threads == 1:
+            return in_time_order(chunks, read)
+        ready: dict[int, Records] = {}
+
+        def read_ahead() -> Iterator[StoredChunk]:
+            def pair(chunk: StoredChunk) -> tuple[StoredChunk, Records]:
+                return chunk, read(chunk)
+
+            for chunk, records in map_in_order(
+                pair, chunks, threads, size=lambda chunk: chunk.size, size_limit=_READ_AHEAD
+            ):
+                ready[id(chunk)] = records
+                yield chunk
+
+        return in_time_order(read_ahead(), lambda chunk: ready.pop(id(chunk)))
 
     def _messages(
         self, runs: Iterator[tuple[StorageReader, Run]], fields: Sequence[str] | None
