@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cache, cached_property
-from itertools import count
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from google.protobuf.message import Message
+from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.compression import records_of
-from rosidl_adapter_proto.bags.decoding import Decode, decoder
+from rosidl_adapter_proto.bags.decoding import decoder
+from rosidl_adapter_proto.bags.message import BagMessage, MessageSource
 from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.order import Run, in_time_order
 from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.bags.types import BagTypes
-from rosidl_adapter_proto.errors import BagError, ConversionError
+from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.time import to_nanoseconds
 from rosidl_adapter_proto.transcode.error import RecordsError
@@ -62,83 +60,6 @@ class BagFile:
     storage: str
     topics: Mapping[int, Topic] = field(repr=False)
     statistics: Statistics = field(repr=False)
-
-
-class BagMessage:
-    """A message of a bag. It unpacks as `topic, message, log_time`.
-
-    Attributes:
-        topic: The topic that it was sent to.
-        log_time: When it was recorded, in nanoseconds since 1970.
-        publish_time: When it was sent, in nanoseconds since 1970; where the recorder did not know, `log_time`.
-        sequence: Its number among those of its sender; 0 where the recorder did not count.
-        data: The message as it was recorded, serialized.
-    """
-
-    __slots__ = ("_decode", "_message", "_number", "data", "log_time", "publish_time", "sequence", "topic")
-
-    def __init__(
-        self,
-        topic: str,
-        log_time: int,
-        publish_time: int,
-        sequence: int,
-        data: bytes,
-        decode: Callable[[BagMessage], Message],
-        number: int,
-    ) -> None:
-        self.topic = topic
-        self.log_time = log_time
-        self.publish_time = publish_time
-        self.sequence = sequence
-        self.data = data
-        self._decode = decode
-        self._number = number
-        self._message: Message | None = None
-
-    @property
-    def message(self) -> Any:
-        """The protobuf message, which is made when it is first asked for.
-
-        Raises:
-            BagError: The bytes are no valid message of the type.
-        """
-        if self._message is None:
-            self._message = self._decode(self)
-        return self._message
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter((self.topic, self.message, self.log_time))
-
-    def __repr__(self) -> str:
-        return f"<BagMessage of {self.topic}, recorded at {self.log_time}, {len(self.data)} bytes>"
-
-
-@dataclass(frozen=True)
-class _Source:
-    """Where messages come from: a topic in a file.
-
-    Attributes:
-        path: The file, for people.
-        topic: The topic.
-        decode: Makes messages of bytes.
-        numbers: Counts the messages.
-    """
-
-    path: str
-    topic: Topic
-    decode: Callable[[], Decode]
-    numbers: Iterator[int] = field(default_factory=lambda: count(1))
-
-    def message(self, recorded: BagMessage) -> Message:
-        """Return the protobuf message of a recorded one."""
-        decode = self.decode()
-        try:
-            return decode(recorded.data)
-        except ConversionError as error:
-            raise BagError(
-                f"{self.path}: message {recorded._number} of {recorded.topic}, recorded at {recorded.log_time}: {error}"
-            ) from error
 
 
 class Bag:
@@ -266,8 +187,9 @@ class Bag:
         names = frozenset(self.topics if topics is None else self._names(topics))
         chosen = None if fields is None else tuple(fields)
         if chosen is not None:
-            for name in sorted(names):
-                decoder(self.topics[name], self.types, chosen)
+            for topic in self.topics.values():
+                if topic.name in names and topic.message_count:
+                    decoder(topic, self.types, chosen)
         return self._messages(self.runs(names, start=start, end=end), chosen)
 
     def runs(
@@ -343,28 +265,29 @@ class Bag:
     def _messages(
         self, runs: Iterator[tuple[StorageReader, Run]], fields: Sequence[str] | None
     ) -> Iterator[BagMessage]:
-        sources: dict[tuple[str, int], _Source] = {}
+        sources: dict[str, dict[int, MessageSource]] = {}
         for reader, run in runs:
-            records = run.records
+            if reader.path not in sources:
+                sources[reader.path] = {
+                    topic_id: self._source(reader.path, topic, fields)
+                    for topic_id, topic in reader.topics.items()
+                }
+            by_topic, records = sources[reader.path], run.records
             data, ranges = records.data, records.ranges
             for i in run.indexes:
-                key = reader.path, records.topic_ids[i]
-                if key not in sources:
-                    sources[key] = self._source(reader, key[1], fields)
-                source = sources[key]
+                source = by_topic[records.topic_ids[i]]
                 yield BagMessage(
                     source.topic.name,
                     records.log_times[i],
                     records.publish_times[i],
                     records.sequences[i],
                     bytes(data[ranges[2 * i] : ranges[2 * i + 1]]),
-                    source.message,
+                    source,
                     next(source.numbers),
                 )
 
-    def _source(self, reader: StorageReader, topic_id: int, fields: Sequence[str] | None) -> _Source:
-        topic = reader.topics[topic_id]
-        return _Source(reader.path, topic, cache(lambda: decoder(topic, self.types, fields)))
+    def _source(self, path: str, topic: Topic, fields: Sequence[str] | None) -> MessageSource:
+        return MessageSource(path, topic, lambda: decoder(topic, self.types, fields))
 
     @cached_property
     def _contents(self) -> tuple[Sequence[BagFile], Sequence[str]]:
@@ -374,6 +297,12 @@ class Bag:
         for reader in self.recording.readers():
             files.append(BagFile(reader.path, reader.storage, reader.topics, reader.statistics))
             warnings.extend(reader.warnings)
+        types: dict[str, set[str]] = {}
+        for topic in (topic for file in files for topic in file.topics.values()):
+            types.setdefault(topic.name, set()).add(topic.type_name)
+        for name, several in types.items():
+            if len(several) > 1:
+                warnings.append(f"{self.path}: topic {name} has several types: {', '.join(sorted(several))}")
         return tuple(files), tuple(dict.fromkeys(warnings))
 
     @property

@@ -20,6 +20,7 @@ from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.routes import formats, selected_topics
 from rosidl_adapter_proto.converters import ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
+from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.time import to_nanoseconds
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def convert_bag(
         on_error=OnError(on_error),
         include=tuple(map(Path, include)),
         distro=distro,
-        registry=registry,
+        registry=registry or ConverterRegistry(),
         threads=threads,
     )
     return _convert(Path(source), Path(destination), settings, progress)
@@ -111,6 +112,7 @@ def _convert(
     _check_names([*settings.topics, *settings.excluded_topics], topics)
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
+    elsewhere = find_catalog(settings.include, settings.distro)
     size = sum(os.path.getsize(file.path) for file in recording.files)
     result = ConversionResult(warnings=recording.warnings, source_size=size)
     written: list[WrittenFile] = []
@@ -118,7 +120,9 @@ def _convert(
     with written_aside(destination, is_folder=is_folder) as place:
         for index, name in enumerate(_names(recording, storage)):
             file = place / name if is_folder else place
-            task = FileTask(recording, index, file, source_format, target_format, storage, settings)
+            task = FileTask(
+                recording, index, file, source_format, target_format, storage, settings, elsewhere
+            )
             made = convert_file(task, add_progress)
             written.append(WrittenFile(name, made.topics, made.statistics))
             result += replace(made.result, size=file.stat().st_size)

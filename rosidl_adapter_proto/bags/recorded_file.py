@@ -197,6 +197,7 @@ _OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {
     SQLITE3: _open_sqlite3,
     ROSBAG: _open_ros1,
 }
+"""Open a file, which the stack closes, also if it turns out that it cannot be read."""
 
 
 class _OpenedFile:

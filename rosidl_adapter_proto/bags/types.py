@@ -67,6 +67,7 @@ class BagTypes:
         include: Folders that have what the recording does not define, or does not define as it should: they come first
             for types that it has no type hash of.
         distro: The distribution of the embedded store.
+        elsewhere: What `include` and `distro` stand for, if it was found before: finding it takes long.
 
     Raises:
         DefinitionError: A folder has no definitions, or the store does not have the distribution.
@@ -74,11 +75,15 @@ class BagTypes:
     """
 
     def __init__(
-        self, topics: Iterable[Topic], include: Iterable[Path] = (), distro: str | None = None
+        self,
+        topics: Iterable[Topic],
+        include: Iterable[Path] = (),
+        distro: str | None = None,
+        elsewhere: Catalog | None = None,
     ) -> None:
         self.warnings: list[str] = []
         include = tuple(include)
-        self._elsewhere = find_catalog(include, distro)
+        self._elsewhere = elsewhere or find_catalog(include, distro)
         self._named = {
             name
             for source in self._elsewhere.sources[: len(include)]
