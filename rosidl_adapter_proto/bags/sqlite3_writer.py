@@ -72,8 +72,8 @@ class SqliteWriter:
     def __init__(self, path: str, *, ros_distro: str = "") -> None:
         self.path = path
         self._topics: dict[int, Topic] = {}
-        self._described: set[str] = set()  # types whose descriptors were written
-        self._defined: set[str] = set()  # types whose definitions were written
+        self._described: dict[str, Topic] = {}  # the topics of which descriptors were written, by their types
+        self._defined: dict[str, Topic] = {}  # the topics of which definitions were written, likewise
         self._counts: Counter[int] = Counter()
         self._times: tuple[int, int] | None = None
         try:
@@ -112,7 +112,7 @@ class SqliteWriter:
             "INSERT INTO topics VALUES (?, ?, ?, ?, ?, ?)",
             topic_id,
             topic.name,
-            topic.type_name,
+            _type_name(topic),
             topic.serialization_format,
             numbered_qos(topic.qos_profiles),
             topic.type_hash,
@@ -170,15 +170,36 @@ class SqliteWriter:
         definition = topic.definition
         if topic.serialization_format == PROTOBUF:
             definition = topic.ros_definition
-            if topic.type_name not in self._described:
-                self._described.add(topic.type_name)
-                self._execute(_DESCRIPTORS)
-                row = topic.type_name, topic.schema_name, topic.definition.data
-                self._execute("INSERT INTO protobuf_descriptors VALUES (?, ?, ?)", *row)
+            self._add_descriptor(topic)
         name = definition_names(topic.type_name)[-1]
-        if definition.encoding and name not in self._defined:
-            self._defined.add(name)
+        if not definition.encoding:
+            return
+        if name not in self._defined:
+            self._defined[name] = topic
             self._execute(_ADD_DEFINITION, name, definition.encoding, definition.data, topic.type_hash)
+        elif topic.serialization_format != PROTOBUF:  # of which the descriptors say it better
+            self._check_same(topic, self._defined[name])
+
+    def _add_descriptor(self, topic: Topic) -> None:
+        name = _type_name(topic)
+        if name in self._described:
+            self._check_same(topic, self._described[name])
+            return
+        self._described[name] = topic
+        self._execute(_DESCRIPTORS)
+        row = name, topic.schema_name, topic.definition.data
+        self._execute("INSERT INTO protobuf_descriptors VALUES (?, ?, ?)", *row)
+
+    def _check_same(self, topic: Topic, other: Topic) -> None:
+        """Check that two topics of one type mean the same: there is one definition for each name of a type."""
+        # The hash of a ROS type says all of CDR, and nothing of the numbers of protobuf.
+        same_hash = topic.serialization_format != PROTOBUF and topic.type_hash == other.type_hash != ""
+        same_type = topic.type_name == other.type_name  # not so for the event of a service, and its request
+        if same_type and not same_hash and topic.definition != other.definition:
+            raise BagError(
+                f"{self.path}: {topic.name} and {other.name} have other definitions of {_type_name(topic)}, and "
+                "sqlite3 has room for one; write MCAP instead"
+            )
 
     def _execute(self, statement: str, *values: object) -> None:
         with self._errors():
@@ -194,3 +215,8 @@ class SqliteWriter:
             ) from None
         except sqlite3.Error as error:
             raise BagError(f"{self.path}: sqlite3 says: {error}") from None
+
+
+def _type_name(topic: Topic) -> str:
+    """Return the ROS type of a topic; that of protobuf, if it has no other."""
+    return topic.type_name or topic.schema_name
