@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.adapter.runtime import adapter_for
+    from rosidl_adapter_proto.bags.bag import open_bag
     from rosidl_adapter_proto.errors import (
         BagError,
         ConversionError,
@@ -51,11 +52,15 @@ __all__ = [
     "TypeRegistry",
     "adapter_for",
     "compute_proto_field_number",
+    "open_bag",
 ]
 
 
+_MODULES = ("errors", "schema.typemap", "schema.numbering", "schema.registry", "adapter.runtime", "bags.bag")
+
+
 def __getattr__(name: str) -> Any:
-    for module in ("errors", "schema.typemap", "schema.numbering", "schema.registry", "adapter.runtime"):
-        if name in __all__ and hasattr(imported := importlib.import_module(f"{__name__}.{module}"), name):
+    for module in _MODULES if name in __all__ else ():
+        if hasattr(imported := importlib.import_module(f"{__name__}.{module}"), name):
             return getattr(imported, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

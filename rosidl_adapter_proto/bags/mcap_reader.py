@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from mcap import records
 from mcap.opcode import Opcode
@@ -25,6 +25,8 @@ from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, S
 from rosidl_adapter_proto.errors import BagError
 
 _SALVAGE = "`--on-error skip` reads what is whole"
+
+_Chunk = TypeVar("_Chunk", ChunkPlace, StoredChunk)
 
 
 class McapReader:
@@ -70,9 +72,21 @@ class McapReader:
             else:
                 yield attachment
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
         """Yield the chunks that may have messages of a selection; see `StorageReader.chunks`."""
-        chunk: StoredChunk | None = None
+        if in_time_order:
+            places = sorted(self._chunks(selection, _without_data), key=lambda place: place.start_time)
+            yield from map(self._file.stored_chunk, places)
+        else:
+            yield from self._chunks(selection, self._with_data)
+
+    def _chunks(
+        self, selection: Selection, found_as: Callable[[ChunkPlace | StoredChunk], _Chunk]
+    ) -> Iterator[_Chunk]:
+        """Yield the chunks that may have messages of a selection, in the order of the file."""
+        chunk: _Chunk | None = None
         chunk_count = 0
         message_counts: list[int | None] = []
         for found in walk(self._file, self._file.size, self._damaged):
@@ -90,10 +104,13 @@ class McapReader:
             chunk_count += isinstance(found, ChunkPlace)
             message_counts.append(found.message_count if isinstance(found, StoredChunk) else None)
             if _in_time(found, selection) and self._has_topics(found, selection):
-                chunk = self._file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
+                chunk = found_as(found)
         if chunk is not None:
             yield replace(chunk, message_count=message_counts[-1])
         self._check_counts(chunk_count, message_counts)
+
+    def _with_data(self, chunk: ChunkPlace | StoredChunk) -> StoredChunk:
+        return chunk if isinstance(chunk, StoredChunk) else self._file.stored_chunk(chunk)
 
     def __enter__(self) -> McapReader:
         return self
@@ -196,4 +213,23 @@ class McapReader:
 def _in_time(chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
     return chunk.end_time >= selection.start_time and (
         selection.end_time is None or chunk.start_time < selection.end_time
+    )
+
+
+def _without_data(chunk: ChunkPlace | StoredChunk) -> ChunkPlace:
+    """Return where a chunk is, so that its data can be read later."""
+    if isinstance(chunk, ChunkPlace):
+        return chunk
+    start, size = chunk.position, chunk.size
+    return ChunkPlace(
+        chunk.where,
+        start,
+        start,
+        size,
+        "",
+        size,
+        chunk.crc,
+        chunk.start_time,
+        chunk.end_time,
+        chunk.message_count,
     )

@@ -82,6 +82,7 @@ class ChunkPlace:
     crc: int
     start_time: int
     end_time: int
+    message_count: int | None = None
 
 
 class McapFile:
@@ -210,7 +211,7 @@ class McapFile:
             where, place.start, data_start, data_size, compression, size, crc, start_time, end_time
         )
 
-    def stored_chunk(self, chunk: ChunkPlace, message_count: int | None = None) -> StoredChunk:
+    def stored_chunk(self, chunk: ChunkPlace) -> StoredChunk:
         """Return a chunk with its data."""
         data = self.read(chunk.data_start, chunk.data_start + chunk.data_size)
         return StoredChunk(
@@ -221,7 +222,8 @@ class McapFile:
             chunk.crc,
             chunk.start_time,
             chunk.end_time,
-            message_count,
+            chunk.message_count,
+            chunk.start,
         )
 
     def loose_messages(self, first: Place, limit: int) -> tuple[StoredChunk, int]:
@@ -247,7 +249,8 @@ class McapFile:
             raise self.damaged(first, "it is too short for a message")
         data = memoryview(piece)[:position]
         where = self.where(first.start)
-        return StoredChunk(where, data, "", position, 0, start_time, end_time, count), first.start + position
+        chunk = StoredChunk(where, data, "", position, 0, start_time, end_time, count, first.start)
+        return chunk, first.start + position
 
 
 def opcode_name(opcode: int) -> str:

@@ -121,6 +121,8 @@ class StoredChunk:
         start_time: When its first message was recorded, in nanoseconds since 1970.
         end_time: When its last message was recorded, in nanoseconds since 1970.
         message_count: How many messages the storage says it has; None if it does not say.
+        position: Where it is in its file: a later chunk has a higher one. Only MCAP, whose chunks may overlap in time,
+            needs one.
     """
 
     where: str
@@ -131,3 +133,4 @@ class StoredChunk:
     start_time: int
     end_time: int
     message_count: int | None = None
+    position: int = 0

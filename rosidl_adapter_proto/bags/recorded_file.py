@@ -18,10 +18,12 @@ import zstandard
 
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.mcap_reader import McapReader
+from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
-from rosidl_adapter_proto.bags.sqlite3_storage import SqliteReader
-from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader
+from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
+from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
+from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import Records, pack_records, read_records
 
@@ -113,6 +115,35 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
         return _OpenedFile(reader, metadata, stack)
 
 
+def create_file(
+    path: str, storage: str, *, profile: str = "", compression: str = "", ros_distro: str = ""
+) -> StorageWriter:
+    """Create a file of a recording.
+
+    Args:
+        path: The file, which must not exist.
+        storage: The name of its storage in rosbag2: `mcap` or `sqlite3`.
+        profile: The profile of an MCAP file.
+        compression: What the chunks of an MCAP file are compressed with: `zstd`, `lz4`, or empty for nothing.
+        ros_distro: The ROS distribution that recorded the messages, which sqlite3 keeps.
+
+    Raises:
+        BagError: It exists, cannot be created, or the storage cannot do what is asked for.
+    """
+    if storage == MCAP:
+        try:
+            return McapWriter(open(path, "xb"), path, profile=profile, compression=compression)
+        except FileExistsError:
+            raise BagError(f"{path}: exists already") from None
+        except OSError as error:
+            raise BagError(f"{path}: {error.strerror}") from None
+    if storage != SQLITE3:
+        raise BagError(f"{path}: the storage {storage!r} cannot be written; use {MCAP} or {SQLITE3}")
+    if compression:
+        raise BagError(f"{path}: sqlite3 has no compression; write MCAP, or leave {compression} out")
+    return SqliteWriter(path, ros_distro=ros_distro)
+
+
 def _decompressed(path: str, stack: ExitStack) -> str:
     """Return a temporary file with what another has compressed."""
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-"))
@@ -173,8 +204,10 @@ class _OpenedFile:
     def attachments(self) -> Iterator[Attachment]:
         return self._reader.attachments()
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        for chunk in self._reader.chunks(selection):
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        for chunk in self._reader.chunks(selection, in_time_order=in_time_order):
             if self._messages_compressed:
                 yield from _with_plain_messages(chunk, selection)
             else:

@@ -43,10 +43,13 @@ class StorageReader(Protocol):
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files inside it, one at a time, since they may be large."""
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
         """Yield the chunks that may have messages of a selection, in the order of the file.
 
-        A chunk may have other messages as well: `_core.read_records` and `_core.RecordConverter` leave them out.
+        With `in_time_order` they come in the order of their start times, and may still overlap. A chunk may have other
+        messages as well: `read_records` and `RecordConverter` leave them out.
 
         Raises:
             BagError: The file is damaged; the message says where.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from datetime import datetime
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +16,7 @@ from rosidl_adapter_proto.generate import Options
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.generate.settings import SETTINGS, Kind, Setting, check_lock_file_is_used
 from rosidl_adapter_proto.interfaces import store
+from rosidl_adapter_proto.time import to_nanoseconds
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -118,3 +120,19 @@ def _check_lock_file(options: Options) -> None:
             check_lock_file_is_used(options.numbering)
         except ValueError as error:
             raise RequestError(f"--lock-file {error}") from None
+
+
+def parse_time(value: str) -> int:
+    """Return a time that stands on the command line, in nanoseconds since 1970."""
+    if value.isascii() and value.isdigit():
+        return int(value)
+    try:
+        # Python reads Z since 3.11.
+        time = datetime.fromisoformat(value[:-1] + "+00:00" if value.endswith("Z") else value)
+    except ValueError:
+        raise click.BadParameter(
+            f"{value!r} is neither like 2026-05-01T12:00:00Z nor a number of nanoseconds since 1970"
+        ) from None
+    if time.tzinfo is None:
+        raise click.BadParameter(f"{value!r} has no time zone; write {value}Z for UTC")
+    return to_nanoseconds(time)

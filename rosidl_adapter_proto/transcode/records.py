@@ -11,9 +11,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from rosidl_adapter_proto.errors import Error
 from rosidl_adapter_proto.transcode import _core
 from rosidl_adapter_proto.transcode.codec import Transcoder
-from rosidl_adapter_proto.transcode.error import TranscodeError
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -152,14 +152,14 @@ class Failure:
         log_time: When it was recorded, in nanoseconds.
         sequence: Its sequence number.
         index: Which message of the chunk it was, counted from 0.
-        error: What is wrong with it: what the transcoder raises for it.
+        error: What is wrong with it: what the transcoder raises for it, or a converter plugin.
     """
 
     topic_id: int
     log_time: int
     sequence: int
     index: int
-    error: TranscodeError
+    error: Error
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,8 @@ CHUNK_SIZE = 2**20
 
 MAXIMUM_TOPIC_ID = 2**16 - 1
 _LAST_ROW = 2**63 - 1
-_ENCODINGS = ("ros2msg", "ros2idl")
+_DEFINITIONS = "message_definitions"
+_DESCRIPTORS = "protobuf_descriptors"
 
 
 class SqliteReader:
@@ -95,13 +96,15 @@ class SqliteReader:
         """Yield nothing: a database has no room for them."""
         return iter(())
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        """Yield the messages of a selection, in the order of the table, as chunks of about `CHUNK_SIZE` bytes.
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        """Yield the messages of a selection as chunks of about `CHUNK_SIZE` bytes; see `StorageReader.chunks`.
 
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
-        query, values = self._selecting(selection)
+        query, values = self._selecting(selection, in_time_order)
         ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
         done = 0
         for rows in self._batches(query, values):
@@ -175,6 +178,11 @@ class SqliteReader:
         except UnicodeDecodeError as error:
             raise BagError(f"{where}: not UTF-8 at byte {error.start}") from None
 
+    def _bytes(self, value: object, table: str, row: int) -> bytes:
+        if not isinstance(value, bytes):
+            raise BagError(f"{self.path}: table {table}, row {row}: expected bytes, not {value!r}")
+        return value
+
     def _read_topics(self) -> tuple[dict[int, int], Mapping[int, Topic]]:
         columns = ("name", "type", "serialization_format", "offered_qos_profiles", "type_description_hash")
         rows = list(self._texts("topics", *columns))
@@ -194,33 +202,33 @@ class SqliteReader:
         return rows_of_topics, topics
 
     def _definitions(self) -> dict[str, RecordedDefinition]:
-        rows = self._texts("message_definitions", "topic_type", "encoding", "encoded_message_definition")
+        names = {
+            row: (name, encoding)
+            for row, name, encoding in self._texts(_DEFINITIONS, "topic_type", "encoding")
+        }
+        texts = self._query(f"SELECT rowid, encoded_message_definition FROM {_DEFINITIONS}") if names else ()
         return {
-            type_name: RecordedDefinition(encoding, text.encode())
-            for _, type_name, encoding, text in rows
-            if encoding in _ENCODINGS  # rosbag2 writes `unknown` for a type whose definition it did not find
+            names[row][0]: RecordedDefinition(names[row][1], self._bytes(text, _DEFINITIONS, row))
+            for row, text in texts
+            if names[row][1] not in ("", "unknown")  # rosbag2 did not find the definition
         }
 
     def _descriptors(self) -> dict[str, tuple[str, RecordedDefinition]]:
-        rows = self._texts("protobuf_descriptors", "topic_type", "full_name")
-        names = {row: (type_name, full_name) for row, type_name, full_name in rows}
-        if not names:
-            return {}
-        found: dict[str, tuple[str, RecordedDefinition]] = {}
-        for row, data in self._query("SELECT rowid, descriptor_set FROM protobuf_descriptors"):
-            if not isinstance(data, bytes):
-                raise BagError(
-                    f"{self.path}: table protobuf_descriptors, row {row}: expected bytes, not {data!r}"
-                )
-            type_name, full_name = names[row]
-            found[type_name] = full_name, RecordedDefinition(PROTOBUF, data)
-        return found
+        names = {
+            row: (name, full_name)
+            for row, name, full_name in self._texts(_DESCRIPTORS, "topic_type", "full_name")
+        }
+        sets = self._query(f"SELECT rowid, descriptor_set FROM {_DESCRIPTORS}") if names else ()
+        return {
+            names[row][0]: (names[row][1], RecordedDefinition(PROTOBUF, self._bytes(data, _DESCRIPTORS, row)))
+            for row, data in sets
+        }
 
     def _read_metadata(self) -> list[tuple[str, Mapping[str, str]]]:
         """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
         return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
 
-    def _selecting(self, selection: Selection) -> tuple[str, list[int]]:
+    def _selecting(self, selection: Selection, in_time_order: bool) -> tuple[str, list[int]]:
         """Return the query for the messages of a selection that come after a row and up to another, and its values."""
         conditions = ["id > ?", "id <= ?"]
         values: list[int] = []
@@ -236,10 +244,9 @@ class SqliteReader:
         if selection.end_time is not None:
             conditions.append("+timestamp < ?")
             values.append(min(selection.end_time, _LAST_ROW))
-        return (
-            f"SELECT id, topic_id, timestamp, data FROM messages WHERE {' AND '.join(conditions)} ORDER BY id",
-            values,
-        )
+        order = "timestamp, id" if in_time_order else "id"
+        where = " AND ".join(conditions)
+        return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
     def _batches(self, query: str, values: list[int]) -> Iterator[list[tuple[Any, ...]]]:
         rows: list[tuple[Any, ...]] = []
@@ -278,6 +285,15 @@ class SqliteReader:
                 read = f"{done + number} messages before it were read"
                 return BagError(f"{self.path}: table messages, row {row}: {reason}; {read}")
         raise AssertionError("a row that cannot be packed is wrong")
+
+
+def definition_names(type_name: str) -> list[str]:
+    """Return the names under which a definition may be: that of a service event is that of its service, by its name."""
+    names = [type_name]
+    if "/srv/" in type_name or "/action/" in type_name:
+        while "_" in names[-1].rsplit("/", 1)[1]:
+            names.append(names[-1].rsplit("_", 1)[0])
+    return names
 
 
 def _topic(

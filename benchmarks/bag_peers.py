@@ -1,0 +1,211 @@
+"""What can be done with bags without this project, and the least that any program has to do."""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
+from pathlib import Path
+from typing import IO, Any
+
+from bag_maker import typestore
+from messages import copy_header, copy_imu, copy_vector
+
+MAGIC = b"\x89MCAP0\r\n"
+CHUNK = 0x06
+RECORD = struct.Struct("<BQ")  # of a record: its opcode and its length (https://mcap.dev/spec#records)
+
+
+def copy_chunks(source: Path, destination: Path, compression: str, threads: int) -> None:
+    """Read, decompress, compress and write the chunks of an MCAP file without looking into them.
+
+    What else is in the file is copied, so that as much is written as in a real one; its index leads nowhere.
+    """
+    with source.open("rb") as read, destination.open("wb") as write, ThreadPoolExecutor(threads) as pool:
+        write.write(read.read(len(MAGIC)))
+        under_way: deque[Callable[[], bytes]] = deque()
+        for record in records(read):
+            if record[0] != CHUNK:
+                under_way.append(record.__bytes__)
+            elif threads == 1:
+                under_way.append(chunk_again(record, compression).__bytes__)
+            else:
+                under_way.append(pool.submit(chunk_again, record, compression).result)
+            while len(under_way) > 4 * threads:
+                write.write(under_way.popleft()())
+        for result in under_way:
+            write.write(result())
+
+
+def records(file: IO[bytes]) -> Iterator[bytes]:
+    """Yield the records of an MCAP file."""
+    while len(start := file.read(RECORD.size)) == RECORD.size:
+        yield start + file.read(RECORD.unpack(start)[1])
+
+
+def chunk_again(record: bytes, compression: str) -> bytes:
+    """Return the record of a chunk (https://mcap.dev/spec#chunk-op0x06), decompressed and compressed again."""
+    from rosidl_adapter_proto.bags.compression import compress
+
+    (name_size,) = struct.unpack_from("<I", record, RECORD.size + 28)
+    at = RECORD.size + 32 + name_size + 8
+    again = compress(decompress(memoryview(record)[at:], compression), compression)
+    head = record[RECORD.size : at - 8] + struct.pack("<Q", len(again))
+    return b"".join((RECORD.pack(CHUNK, len(head) + len(again)), head, again))
+
+
+def decompress(data: memoryview, compression: str) -> Any:
+    import lz4.frame
+    import zstandard
+
+    if compression == "zstd":
+        return zstandard.ZstdDecompressor().decompress(data)
+    return lz4.frame.decompress(data) if compression == "lz4" else data
+
+
+def copy_with_library(source: Path, destination: Path, compression: str) -> None:
+    """Copy a file with the mcap library, message by message."""
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    with source.open("rb") as read, destination.open("wb") as write:
+        writer = Writer(write, compression=mcap_compression(compression))
+        writer.start(profile="ros2")
+        channels: dict[int, int] = {}
+        for schema, channel, message in make_reader(read).iter_messages(log_time_order=False):
+            if channel.id not in channels:
+                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, schema_id, channel.metadata
+                )
+            writer.add_message(
+                channels[channel.id],
+                message.log_time,
+                message.data,
+                message.publish_time,
+                message.sequence,
+            )
+        writer.finish()
+
+
+def mcap_compression(name: str) -> Any:
+    from mcap.writer import CompressionType
+
+    return CompressionType[(name or "none").upper()]
+
+
+def convert_by_hand(source: Path, destination: Path, classes: dict[str, Any], count: int) -> None:
+    """Convert the first messages of a bag as one does today: rosbags, a copy of each attribute, and the mcap writer.
+
+    Args:
+        source: An MCAP file.
+        destination: The MCAP file to write.
+        classes: The protobuf class of each ROS type.
+        count: How many messages.
+    """
+    from mcap.writer import Writer
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([source]) as reader, destination.open("wb") as write:
+        writer = Writer(write, compression=mcap_compression(""))
+        writer.start(profile="")
+        channels: dict[str, int] = {}
+        for connection, time, data in islice(reader.messages(), count):
+            custom_class = classes[connection.msgtype]
+            if connection.topic not in channels:
+                descriptor = custom_class.DESCRIPTOR
+                schema = writer.register_schema(descriptor.full_name, "protobuf", descriptor_set(descriptor))
+                channels[connection.topic] = writer.register_channel(connection.topic, "protobuf", schema)
+            message = reader.deserialize(data, connection.msgtype)
+            custom = COPIES[connection.msgtype](message, custom_class())
+            writer.add_message(channels[connection.topic], time, custom.SerializeToString(), time)
+        writer.finish()
+
+
+def descriptor_set(descriptor: Any) -> bytes:
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+
+    files: dict[str, Any] = {}
+
+    def add(file: Any) -> None:
+        for each in file.dependencies:
+            add(each)
+        files[file.name] = file
+
+    add(descriptor.file)
+    result = FileDescriptorSet()
+    for file in files.values():
+        file.CopyToProto(result.file.add())
+    return result.SerializeToString()
+
+
+# Adapters as a user would write them: attribute by attribute.
+
+
+def extend(target: Any, name: str, values: Any) -> None:
+    getattr(target, name).extend(values.tolist())
+
+
+def copy_joint_state(source: Any, target: Any) -> Any:
+    copy_header(source, target)
+    target.name.extend(source.name)
+    for name in ("position", "velocity", "effort"):
+        extend(target, name, getattr(source, name))
+    return target
+
+
+def copy_tf(source: Any, target: Any) -> Any:
+    for each in source.transforms:
+        copied = target.transforms.add()
+        copy_header(each, copied)
+        copied.child_frame_id = each.child_frame_id
+        copy_vector(each.transform.translation, copied.transform.translation, "xyz")
+        copy_vector(each.transform.rotation, copied.transform.rotation, "xyzw")
+    return target
+
+
+COPIES: dict[str, Callable[[Any, Any], Any]] = {
+    "sensor_msgs/msg/Imu": lambda source, target: copy_imu(source, target, extend),
+    "sensor_msgs/msg/JointState": copy_joint_state,
+    "tf2_msgs/msg/TFMessage": copy_tf,
+}
+
+
+# Reading.
+
+
+def read_with_rosbags(source: Path, count: int) -> int:
+    """Deserialize the first messages of a bag with rosbags, and return how many there were."""
+    from rosbags.highlevel import AnyReader
+
+    number = 0
+    with AnyReader([source], default_typestore=typestore()) as reader:
+        for connection, _, data in islice(reader.messages(), count):
+            reader.deserialize(data, connection.msgtype)
+            number += 1
+    return number
+
+
+def read_with_mcap_ros2(source: Path, count: int) -> int:
+    """Decode the first messages of a bag with mcap-ros2-support, and return how many there were."""
+    from mcap_ros2.reader import read_ros2_messages
+
+    return sum(1 for _ in islice(read_ros2_messages(str(source)), count))
+
+
+def copy_rows(source: Path, destination: Path) -> None:
+    """Copy the messages of a sqlite3 file, as one does who does not look at them."""
+    import sqlite3
+
+    with sqlite3.connect(source) as read, sqlite3.connect(destination) as write:
+        write.execute(
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
+        )
+        write.executemany(
+            "INSERT INTO messages VALUES (?, ?, ?, ?)",
+            read.execute("SELECT id, topic_id, timestamp, data FROM messages ORDER BY timestamp"),
+        )
+    read.close()
+    write.close()

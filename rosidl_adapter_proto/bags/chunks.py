@@ -1,0 +1,141 @@
+"""Converts chunks: what the threads do while a bag is converted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.model import StoredChunk
+from rosidl_adapter_proto.bags.plugins import PluginConverter
+from rosidl_adapter_proto.bags.routes import TopicRoute
+from rosidl_adapter_proto.bags.storage import PackedChunk, StorageWriter
+from rosidl_adapter_proto.converters import Converter
+from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.schema.registry import Schema
+from rosidl_adapter_proto.transcode import Transcoder
+from rosidl_adapter_proto.transcode.error import RecordsError
+from rosidl_adapter_proto.transcode.records import (
+    Converted,
+    Failure,
+    RecordConverter,
+    Route,
+    read_records,
+)
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+
+class ChunkConverter(Protocol):
+    """Converts records: `RecordConverter`, or `PluginConverter` for formats that the native module does not know."""
+
+    def convert(self, data: Buffer, *, start_time: int = 0, end_time: int | None = None) -> Converted: ...
+
+
+def chunk_converter(
+    routes: Mapping[int, TopicRoute],
+    failed_ids: Mapping[int, int],
+    converter: Converter,
+) -> ChunkConverter:
+    """Return what converts the chunks of a file.
+
+    Args:
+        routes: What becomes of each topic, by its id.
+        failed_ids: The ids in the result of messages that cannot be converted; without one they are left out.
+        converter: What converts messages from their serialization format to the other.
+    """
+    directions = converter.native_directions
+    if directions is None or len(directions) > 1:
+        return PluginConverter(routes, failed_ids, converter)
+    transcoders: dict[Schema, Transcoder] = {}
+    native: dict[int, Route | None] = {}
+    for topic_id, route in routes.items():
+        if route.result is None:
+            native[topic_id] = None
+        elif route.schema is None:
+            native[topic_id] = Route(topic_id)
+        else:
+            if route.schema not in transcoders:
+                transcoders[route.schema] = Transcoder(route.schema.type_description, route.schema.descriptor)
+            native[topic_id] = Route(
+                topic_id, transcoders[route.schema], directions[0], failed_ids.get(topic_id)
+            )
+    return RecordConverter(native)
+
+
+@dataclass(frozen=True)
+class FailureInChunk:
+    """A message that could not be converted.
+
+    Attributes:
+        failure: What is wrong with it.
+        number: Which message of its topic in the chunk it is, counted from 0.
+    """
+
+    failure: Failure
+    number: int
+
+
+@dataclass(frozen=True)
+class ConvertedChunk:
+    """A chunk that was converted, ready to be written.
+
+    Attributes:
+        source: The chunk that it was.
+        packed: What is to be written; None if no message is left.
+        failures: The messages that could not be converted.
+        damage: Why the chunk could not be read; it then has nothing else.
+    """
+
+    source: StoredChunk
+    packed: PackedChunk | None = None
+    failures: Sequence[FailureInChunk] = ()
+    damage: BagError | None = None
+
+
+def convert_chunk(
+    chunk: StoredChunk,
+    converter: ChunkConverter,
+    writer: StorageWriter,
+    start_time: int,
+    end_time: int | None,
+) -> ConvertedChunk:
+    """Convert a chunk, on any thread.
+
+    Args:
+        chunk: The chunk.
+        converter: What converts its records.
+        writer: What it will be written with.
+        start_time: The first time of recording to convert.
+        end_time: The first time not to convert any more; None for no end.
+    """
+    try:
+        records = records_of(chunk)
+        converted = converter.convert(records, start_time=start_time, end_time=end_time)
+    except BagError as error:
+        return ConvertedChunk(chunk, damage=error)
+    except RecordsError as error:
+        return ConvertedChunk(chunk, damage=BagError(f"{chunk.where}: {error}"))
+    packed = writer.pack(converted.data) if converted.message_count else None
+    failures = _in_topics(records, converted.failures, start_time, end_time) if converted.failures else ()
+    return ConvertedChunk(chunk, packed, failures)
+
+
+def _in_topics(
+    data: Buffer, failures: Sequence[Failure], start_time: int, end_time: int | None
+) -> list[FailureInChunk]:
+    """Return which messages of their topics those are that failed."""
+    records = read_records(data)
+    by_index = {each.index: each for each in failures}
+    counts: dict[int, int] = {}
+    found = []
+    for index, (topic_id, log_time) in enumerate(zip(records.topic_ids, records.log_times, strict=True)):
+        if log_time < start_time or (end_time is not None and log_time >= end_time):
+            continue
+        number = counts.get(topic_id, 0)
+        counts[topic_id] = number + 1
+        if index in by_index:
+            found.append(FailureInChunk(by_index[index], number))
+    return found

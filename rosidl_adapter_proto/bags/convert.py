@@ -1,0 +1,189 @@
+"""Converts whole bags from one serialization format to another, and from one storage to another."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Progress, Settings
+from rosidl_adapter_proto.bags.convert_file import FileTask, convert_file
+from rosidl_adapter_proto.bags.description import WrittenFile, describe
+from rosidl_adapter_proto.bags.metadata import METADATA_FILE, write_metadata
+from rosidl_adapter_proto.bags.model import Topic
+from rosidl_adapter_proto.bags.output import check_new, written_aside
+from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFIXES, ZSTD_SUFFIX
+from rosidl_adapter_proto.bags.recording import Recording, find_recording
+from rosidl_adapter_proto.bags.routes import formats, selected_topics
+from rosidl_adapter_proto.converters import Converter, ConverterRegistry
+from rosidl_adapter_proto.errors import RequestError
+from rosidl_adapter_proto.time import to_nanoseconds
+
+if TYPE_CHECKING:
+    from rosidl_adapter_proto.time import Time
+
+_WRITTEN = {MCAP: ".mcap", SQLITE3: ".db3"}
+"""The storages that are written, and how their files end."""
+
+
+def convert_bag(
+    source: Path | str,
+    destination: Path | str,
+    *,
+    source_format: str | None = None,
+    target_format: str | None = None,
+    storage: str | None = None,
+    compression: str | None = None,
+    topics: Iterable[str] = (),
+    excluded_topics: Iterable[str] = (),
+    start: Time = 0,
+    end: Time | None = None,
+    on_error: str = "stop",
+    include: Iterable[Path | str] = (),
+    distro: str | None = None,
+    registry: ConverterRegistry | None = None,
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> ConversionResult:
+    """Convert a bag.
+
+    The source is never changed. The result is written aside, and has its name once it is complete; what exists is
+    never overwritten, and if anything fails, nothing is left of the result.
+
+    Args:
+        source: A folder that rosbag2 has recorded, a file of one, or a ROS 1 bag.
+        destination: The folder to write; or the file, if its name ends as those of a storage (`.mcap`, `.db3`) do.
+        source_format: How the messages are serialized, whatever the bag says; by default what it says.
+        target_format: What to convert to; by default `protobuf`, and `cdr` if the messages are protobuf.
+        storage: The storage of the result, `mcap` or `sqlite3`; by default that of the source, and `mcap` for ROS 1.
+        compression: How chunks are compressed, `none`, `zstd` or `lz4`; by default as in the source.
+        topics: Which topics to convert: names, or patterns with `*`, `?` and `[...]`; by default all.
+        excluded_topics: Which topics to leave out, likewise.
+        start: When the first message to convert was recorded: a `datetime`, nanoseconds since 1970, or another time.
+        end: When the first message not to convert any more was recorded; by default there is no end.
+        on_error: What becomes of messages that cannot be converted: `stop`, `skip` or `copy` (`OnError`).
+        include: Folders with definitions that the bag does not have.
+        distro: The ROS distribution of the embedded store, for definitions that are nowhere else.
+        registry: Where converter plugins come from; by default those that are installed.
+        threads: On how many threads to convert; by default one for each processor.
+        progress: Called whenever something was written.
+
+    Returns:
+        What was done. All numbers together are what the storage itself says.
+
+    Raises:
+        BagError: The bag, or a message of it, cannot be converted, or the result cannot be written.
+        ConverterError: There is no converter for a serialization format.
+        DefinitionError: A folder with definitions cannot be read.
+        RequestError: What is asked for does not fit the bag.
+    """
+    settings = Settings(
+        source_format=source_format,
+        target_format=target_format,
+        storage=storage,
+        compression=compression,
+        topics=tuple(topics),
+        excluded_topics=tuple(excluded_topics),
+        start_time=to_nanoseconds(start),
+        end_time=None if end is None else to_nanoseconds(end),
+        on_error=OnError(on_error),
+        include=tuple(map(Path, include)),
+        distro=distro,
+        registry=registry,
+        threads=threads,
+    )
+    return _convert(Path(source), Path(destination), settings, progress)
+
+
+def _convert(
+    source: Path, destination: Path, settings: Settings, progress: Callable[[Progress], None] | None
+) -> ConversionResult:
+    check_new(destination)
+    if destination.resolve().is_relative_to(source.resolve()):
+        raise RequestError(f"{destination} is inside of {source}, which is not changed; choose another place")
+    recording = find_recording(str(source))
+    storage, is_folder = _form(recording, destination, settings)
+    topics = _topics(recording)
+    _check_names([*settings.topics, *settings.excluded_topics], topics)
+    selected = selected_topics(dict(enumerate(topics)), settings)
+    source_format, target_format = formats(list(selected.values()), settings)
+    Converter(
+        source_format, target_format, settings.registry
+    )  # whether there is one, before anything is written
+    size = sum(os.path.getsize(file.path) for file in recording.files)
+    result = ConversionResult(warnings=recording.warnings, source_size=size)
+    written: list[WrittenFile] = []
+    add_progress = _summed(progress, size)
+    with written_aside(destination, is_folder=is_folder) as place:
+        for index, name in enumerate(_names(recording, storage)):
+            file = place / name if is_folder else place
+            task = FileTask(recording, index, file, source_format, target_format, storage, settings)
+            made = convert_file(task, add_progress)
+            written.append(WrittenFile(name, made.topics, made.statistics))
+            result += replace(made.result, size=file.stat().st_size)
+        if is_folder:
+            text = write_metadata(describe(storage, written, recording.metadata))
+            (place / METADATA_FILE).write_text(text, encoding="utf-8")
+    return result
+
+
+def _summed(progress: Callable[[Progress], None] | None, total: int) -> Callable[[int, int], None]:
+    """Return what adds up the progress of all files, and tells it."""
+    done = message_count = 0
+
+    def add(size: int, messages: int) -> None:
+        nonlocal done, message_count
+        done += size
+        message_count += messages
+        if progress:
+            progress(Progress(min(done, total), total, message_count))
+
+    return add
+
+
+def _form(recording: Recording, destination: Path, settings: Settings) -> tuple[str, bool]:
+    """Return the storage of the result, and whether it is a folder."""
+    by_name = SUFFIXES.get(destination.suffix)
+    storage = settings.storage or by_name or recording.storage
+    storage = MCAP if storage == ROSBAG and storage != by_name else storage
+    if storage not in _WRITTEN:
+        raise RequestError(f"storage {storage!r} cannot be written; {' and '.join(_WRITTEN)} can")
+    if by_name not in (None, storage):
+        raise RequestError(f"{destination} ends as a file of {by_name}, and the storage is to be {storage}")
+    if storage == SQLITE3 and settings.compression not in (None, "none"):
+        raise RequestError("files of sqlite3 are not compressed; leave --compression out, or write mcap")
+    if by_name and len(recording.files) > 1:
+        raise RequestError(
+            f"{recording.path} has {len(recording.files)} files, each of which becomes one: "
+            f"name a folder instead of {destination}"
+        )
+    return storage, by_name is None
+
+
+def _topics(recording: Recording) -> list[Topic]:
+    """Return the topics of all files."""
+    if recording.metadata and any(file.compressed for file in recording.files):
+        return [information.topic for information in recording.metadata.topics]
+    topics: list[Topic] = []
+    for reader in recording.readers(salvage=True):  # what is damaged is said when it is converted
+        topics += reader.topics.values()
+    return topics
+
+
+def _check_names(patterns: Sequence[str], topics: Sequence[Topic]) -> None:
+    names = sorted({topic.name for topic in topics})
+    for pattern in patterns:
+        if not any(name == pattern or fnmatchcase(name, pattern) for name in names):
+            raise RequestError(f"no topic is called {pattern}; there are {', '.join(names) or 'none'}")
+
+
+def _names(recording: Recording, storage: str) -> list[str]:
+    """Return the names of the files of the result, after those of the source."""
+    stems = [Path(Path(file.path).name.removesuffix(ZSTD_SUFFIX)).stem for file in recording.files]
+    return [
+        (stem if stems.count(stem) == 1 else f"{stem}_{index}") + _WRITTEN[storage]
+        for index, stem in enumerate(stems)
+    ]

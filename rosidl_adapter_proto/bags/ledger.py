@@ -1,0 +1,139 @@
+"""Accounts for every message of a file that is converted: none may be lost without a word."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from rosidl_adapter_proto.bags.chunks import FailureInChunk
+from rosidl_adapter_proto.bags.conversion import SHOWN_FAILURES, Counts, FailedMessage, OnError, Settings
+from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
+from rosidl_adapter_proto.errors import BagError
+
+
+class Ledger:
+    """What has become of the messages of a file.
+
+    Attributes:
+        failures: The first messages that could not be converted.
+        damage: What is wrong with the file itself.
+        warnings: What the user should know.
+
+    Args:
+        path: The file, for people.
+        routes: What becomes of its topics.
+        said: How many messages the file says that each topic has.
+        settings: How to convert.
+    """
+
+    def __init__(
+        self, path: str, routes: Mapping[int, TopicRoute], said: Mapping[int, int], settings: Settings
+    ) -> None:
+        self.failures: list[FailedMessage] = []
+        self.damage: list[BagError] = []
+        self.warnings: list[str] = []
+        self._path = path
+        self._routes = routes
+        self._said = said
+        self._on_error = settings.on_error
+        self._chooses_times = settings.start_time > 0 or settings.end_time is not None
+        self._failed: Counter[int] = Counter()
+
+    @property
+    def failed_count(self) -> int:
+        """How many messages could not be converted."""
+        return self._failed.total()
+
+    def add_failures(self, failures: Sequence[FailureInChunk], written: Mapping[int, int]) -> None:
+        """Note the messages of a chunk that could not be converted.
+
+        Args:
+            failures: The messages.
+            written: How many messages of each topic the chunks before it gave.
+
+        Raises:
+            BagError: The conversion is to stop there.
+        """
+        before = Counter(written) + self._failed
+        for each in failures:
+            failure = each.failure
+            self._failed[failure.topic_id] += 1
+            if len(self.failures) < SHOWN_FAILURES:
+                self.failures.append(
+                    FailedMessage(
+                        self._path,
+                        self._routes[failure.topic_id].topic.name,
+                        before[failure.topic_id] + each.number + 1,
+                        failure.log_time,
+                        str(failure.error),
+                    )
+                )
+            if self._on_error is OnError.STOP:
+                raise BagError(
+                    f"{self.failures[0]}; `--on-error skip` leaves such messages out, and `--on-error copy` copies them"
+                )
+
+    def add_damage(self, damage: BagError, written: Mapping[int, int]) -> None:
+        """Note that the file is damaged.
+
+        Args:
+            damage: What is wrong, and where.
+            written: How many messages of each topic came before that.
+
+        Raises:
+            BagError: The conversion is to stop there.
+        """
+        if self._on_error is OnError.STOP:
+            raise BagError(
+                f"{damage}; the {sum(written.values())} messages before that can be read: "
+                "`--on-error skip` converts whatever can be read"
+            )
+        self.damage.append(damage)
+        self.warnings.append(str(damage))
+
+    def counts(self, written: Mapping[int, int]) -> dict[str, Counts]:
+        """Return what became of the messages of each topic, by its name, compared with what the file says.
+
+        Args:
+            written: How many messages of each topic were written, without those that could not be converted.
+
+        Raises:
+            BagError: There are other numbers of messages than the file says, and nobody asked to go on then.
+        """
+        found: dict[str, Counts] = {}
+        for topic_id, route in self._routes.items():
+            name = route.topic.name
+            counts = self._of_topic(topic_id, route.fate, written.get(topic_id, 0))
+            self._compare(name, counts, self._said.get(topic_id, 0))
+            found[name] = found.get(name, Counts()) + counts
+        return found
+
+    def _of_topic(self, topic_id: int, fate: Fate, written: int) -> Counts:
+        said, failed = self._said.get(topic_id, 0), self._failed[topic_id]
+        if fate is Fate.NOT_SELECTED:
+            return Counts(not_selected=said)
+        if fate is Fate.SKIPPED:
+            return Counts(skipped=said)
+        if fate is Fate.COPIED:
+            return Counts(copied=written)
+        if self._on_error is OnError.COPY:
+            return Counts(converted=written, copied=failed)
+        return Counts(converted=written, skipped=failed)
+
+    def _compare(self, name: str, counts: Counts, said: int) -> None:
+        """Account for the messages of a topic that were not found."""
+        found, missing = counts.total, said - counts.total
+        if missing > 0 and self._chooses_times:
+            counts.not_selected = missing
+        elif missing and self._on_error is OnError.STOP:
+            raise BagError(
+                f"{self._path}: it says that {name} has {said} messages, but {found} were found; "
+                "`--on-error skip` converts those"
+            )
+        elif missing > 0:
+            counts.lost = missing
+            self.warnings.append(f"{self._path}: {missing} of the {said} messages of {name} are lost")
+        elif missing:
+            self.warnings.append(
+                f"{self._path}: it says that {name} has {said} messages, but {found} were found"
+            )

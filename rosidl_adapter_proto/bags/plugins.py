@@ -1,0 +1,103 @@
+"""Converts chunks with converter plugins, for formats that the native module does not know."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Mapping
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
+from rosidl_adapter_proto.converters import Converter, SerializedBagMessage
+from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.transcode.records import Converted, Failure, Records, pack_records, read_records
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+
+class PluginConverter:
+    """Converts chunks, and may be used by many threads, of which one at a time is in the plugins.
+
+    Args:
+        routes: What becomes of each topic, by its id.
+        failed_ids: The ids in the result of messages that cannot be converted; without one they are left out.
+        converter: What converts each message.
+    """
+
+    def __init__(
+        self, routes: Mapping[int, TopicRoute], failed_ids: Mapping[int, int], converter: Converter
+    ) -> None:
+        self._routes = routes
+        self._failed_ids = failed_ids
+        self._converter = converter
+        self._lock = Lock()
+
+    def convert(self, data: Buffer, *, start_time: int = 0, end_time: int | None = None) -> Converted:
+        """Do what `RecordConverter.convert` does."""
+        records = read_records(data)
+        chosen = [
+            index
+            for index, (topic_id, time) in enumerate(zip(records.topic_ids, records.log_times, strict=True))
+            if self._routes[topic_id].result is not None
+            and time >= start_time
+            and (end_time is None or time < end_time)
+        ]
+        results: dict[int, Buffer | Error] = {index: records[index] for index in chosen}
+        for topic_id in {records.topic_ids[index] for index in chosen}:
+            if self._routes[topic_id].fate is Fate.CONVERTED:
+                self._convert_topic(
+                    records,
+                    topic_id,
+                    [each for each in chosen if records.topic_ids[each] == topic_id],
+                    results,
+                )
+        return self._packed(records, results)
+
+    def _convert_topic(
+        self, records: Records, topic_id: int, indexes: list[int], results: dict[int, Buffer | Error]
+    ) -> None:
+        """Replace the messages of one topic by what they become."""
+        route = self._routes[topic_id]
+        assert route.schema is not None, "what is converted has a type"
+        messages = [
+            SerializedBagMessage(
+                records[index],
+                route.topic.name,
+                records.log_times[index],
+                records.publish_times[index],
+                records.sequences[index],
+            )
+            for index in indexes
+        ]
+        with self._lock:
+            converted = self._converter.convert_batch(messages, route.schema, route.result_schema)
+        for index, each in zip(indexes, converted, strict=True):
+            results[index] = each if isinstance(each, Error) else each.serialized_data
+
+    def _packed(self, records: Records, results: Mapping[int, Buffer | Error]) -> Converted:
+        failures: list[Failure] = []
+        messages: list[Buffer] = []
+        topic_ids, indexes = array("H"), []
+        for index, result in results.items():
+            topic_id = records.topic_ids[index]
+            if not isinstance(result, Error):
+                topic_ids.append(topic_id)
+                indexes.append(index)
+                messages.append(result)
+                continue
+            failures.append(
+                Failure(topic_id, records.log_times[index], records.sequences[index], index, result)
+            )
+            if topic_id in self._failed_ids:
+                topic_ids.append(self._failed_ids[topic_id])
+                indexes.append(index)
+                messages.append(records[index])
+        data = pack_records(
+            topic_ids,
+            array("I", (records.sequences[each] for each in indexes)),
+            array("Q", (records.log_times[each] for each in indexes)),
+            array("Q", (records.publish_times[each] for each in indexes)),
+            messages,
+        )
+        return Converted(memoryview(data), len(messages), failures)

@@ -1,0 +1,190 @@
+"""What becomes of each topic of a file that is converted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from fnmatch import fnmatchcase
+
+from rosidl_adapter_proto.bags.conversion import DEFAULT_FORMATS, OnError, Settings
+from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, RecordedDefinition, Statistics, Topic
+from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition
+from rosidl_adapter_proto.converters.ros1 import check_ros2_type
+from rosidl_adapter_proto.errors import BagError, ConverterError
+from rosidl_adapter_proto.schema.registry import Schema
+
+MIXED_FORMATS = (
+    "Topics with different rmw serialization format have been found. "
+    "All topics must have the same serialization format."
+)
+"""What rosbag2 says of a bag whose topics differ (`rosbag2_cpp::SequentialReader`)."""
+
+
+class Fate(Enum):
+    """What becomes of the messages of a topic.
+
+    Attributes:
+        CONVERTED: They are converted.
+        COPIED: They are copied as they are.
+        SKIPPED: They are left out, since nothing is known of their type.
+        NOT_SELECTED: They are left out, since nobody asked for them.
+    """
+
+    CONVERTED = "converted"
+    COPIED = "copied"
+    SKIPPED = "skipped"
+    NOT_SELECTED = "not selected"
+
+
+@dataclass(frozen=True)
+class TopicRoute:
+    """What becomes of one topic.
+
+    Attributes:
+        topic: The topic in the source, with the serialization format that the user says it has.
+        fate: What becomes of its messages.
+        result: The topic in the result; None if it is not there.
+        schema: The type of the messages, if they are converted.
+        result_schema: The type of what they become.
+        reason: Why they are not converted, though they should be.
+    """
+
+    topic: Topic
+    fate: Fate
+    result: Topic | None = None
+    schema: Schema | None = None
+    result_schema: Schema | None = None
+    reason: str = ""
+
+
+def selected_topics(topics: Mapping[int, Topic], settings: Settings) -> dict[int, Topic]:
+    """Return the topics that are to be converted, with the serialization format that the user says they have."""
+    return {
+        topic_id: replace(topic, serialization_format=settings.source_format or topic.serialization_format)
+        for topic_id, topic in topics.items()
+        if (not settings.topics or _matches(topic.name, settings.topics))
+        and not _matches(topic.name, settings.excluded_topics)
+    }
+
+
+def _matches(name: str, patterns: Sequence[str]) -> bool:
+    return any(name == pattern or fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def formats(topics: Sequence[Topic], settings: Settings) -> tuple[str, str]:
+    """Return the one serialization format that the topics of a bag have, and the one that they get.
+
+    Raises:
+        BagError: They have different ones, or there are no topics.
+    """
+    found = {topic.serialization_format for topic in topics}
+    if len(found) > 1:
+        by_format = "; ".join(
+            f"{each}: {', '.join(sorted({topic.name for topic in topics if topic.serialization_format == each}))}"
+            for each in sorted(found)
+        )
+        raise BagError(f"{MIXED_FORMATS} ({by_format}; `--topic` chooses some)")
+    source_format = found.pop() if found else settings.source_format or CDR
+    return source_format, settings.target_format or DEFAULT_FORMATS.get(source_format, PROTOBUF)
+
+
+def plan_routes(
+    topics: Mapping[int, Topic],
+    statistics: Statistics,
+    settings: Settings,
+    target_format: str,
+    types: BagTypes,
+) -> dict[int, TopicRoute]:
+    """Return what becomes of each topic of a file, by its id.
+
+    Args:
+        topics: All topics of the file.
+        statistics: How many messages they have: nothing need be known of the type of a topic without any.
+        settings: How to convert.
+        target_format: What to convert to.
+        types: The types of the topics.
+
+    Raises:
+        BagError: Nothing is known of the type of a topic that has messages.
+    """
+    selected = selected_topics(topics, settings)
+    return {
+        topic_id: (
+            _route(
+                selected[topic_id],
+                bool(statistics.message_counts.get(topic_id)),
+                settings.on_error,
+                target_format,
+                types,
+            )
+            if topic_id in selected
+            else TopicRoute(topic, Fate.NOT_SELECTED)
+        )
+        for topic_id, topic in topics.items()
+    }
+
+
+def _route(
+    topic: Topic, has_messages: bool, on_error: OnError, target_format: str, types: BagTypes
+) -> TopicRoute:
+    if topic.serialization_format == target_format:
+        return TopicRoute(topic, Fate.COPIED, topic)
+    try:
+        schema = types.schema(topic)
+        if topic.serialization_format == ROS1 and target_format != PROTOBUF:
+            result_schema, ros_definition = _ros2_type(topic, schema, types)
+        else:
+            result_schema, ros_definition = schema, types.ros_definition(topic)
+    except (BagError, ConverterError) as error:
+        if not has_messages:
+            return TopicRoute(topic, Fate.COPIED, _without_definition(topic, target_format))
+        if on_error is OnError.STOP:
+            raise
+        if on_error is OnError.COPY:
+            return TopicRoute(topic, Fate.COPIED, topic, reason=str(error))
+        return TopicRoute(topic, Fate.SKIPPED, reason=str(error))
+    result = _result(topic, target_format, result_schema, ros_definition)
+    return TopicRoute(topic, Fate.CONVERTED, result, schema, result_schema)
+
+
+def _ros2_type(topic: Topic, schema: Schema, types: BagTypes) -> tuple[Schema, RecordedDefinition]:
+    """Return the type of ROS 2 that messages of ROS 1 get, and its definition.
+
+    Raises:
+        BagError: ROS 2 has no such type.
+        ConverterError: It has not all that the type of ROS 1 has.
+    """
+    ros2 = replace(topic, serialization_format=CDR, definition=RecordedDefinition(), type_hash="")
+    result = types.schema(ros2)
+    check_ros2_type(schema, result)
+    return result, types.ros_definition(ros2)
+
+
+def _result(topic: Topic, target_format: str, schema: Schema, ros_definition: RecordedDefinition) -> Topic:
+    """Return what a topic becomes."""
+    if target_format == PROTOBUF:
+        return replace(
+            topic,
+            serialization_format=target_format,
+            definition=protobuf_definition(schema),
+            ros_definition=ros_definition,
+            schema_name=schema.descriptor.full_name,
+        )
+    return replace(
+        topic,
+        serialization_format=target_format,
+        definition=ros_definition,
+        ros_definition=RecordedDefinition(),
+        schema_name=topic.type_name,
+    )
+
+
+def _without_definition(topic: Topic, target_format: str) -> Topic:
+    """Return a topic whose type nobody knows in another format: it has no messages, and so needs none."""
+    return replace(
+        topic,
+        serialization_format=target_format,
+        definition=RecordedDefinition(),
+        schema_name=topic.type_name,
+    )
