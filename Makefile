@@ -117,6 +117,7 @@ fuzz: $(VENV)/ready
 benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/generate.py
 	$(BIN)/python benchmarks/messages.py
+	$(BIN)/python benchmarks/bags.py
 
 golden: $(VENV)/ready
 	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py \

@@ -141,19 +141,18 @@ class Bag:
 
     Attributes:
         path: The folder or the file.
+        recording: Its files, as they are stored.
 
     Args:
-        recording: Its files.
-        interfaces: Folders that have the definitions that the bag does not have.
+        recording: Its files, as they are stored.
+        include: Folders that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else.
     """
 
-    def __init__(
-        self, recording: Recording, interfaces: Iterable[Path] = (), distro: str | None = None
-    ) -> None:
+    def __init__(self, recording: Recording, include: Iterable[Path] = (), distro: str | None = None) -> None:
         self.path = recording.path
-        self._recording = recording
-        self._interfaces = tuple(interfaces)
+        self.recording = recording
+        self._include = tuple(include)
         self._distro = distro
         self._closed = False
 
@@ -218,7 +217,7 @@ class Bag:
     def types(self) -> BagTypes:
         """The types of all topics."""
         topics = (topic for file in self.files for topic in file.topics.values())
-        return BagTypes(topics, self._interfaces, self._distro)
+        return BagTypes(topics, self._include, self._distro)
 
     def schema(self, topic: str) -> Schema:
         """Return the type of a topic, as `TypeRegistry` has it.
@@ -278,7 +277,7 @@ class Bag:
             if not ids or after or before:
                 continue
             self._check_open()
-            with self._recording.open(index) as reader:
+            with self.recording.open(index) as reader:
                 yield from self._file_messages(reader, Selection(ids, start_time, end_time), fields)
 
     def _file_messages(
@@ -318,8 +317,8 @@ class Bag:
     def _contents(self) -> tuple[Sequence[BagFile], Sequence[str]]:
         """The files, and what is odd about them; each is opened for it once."""
         self._check_open()
-        files, warnings = [], list(self._recording.warnings)
-        for reader in self._recording.readers():
+        files, warnings = [], list(self.recording.warnings)
+        for reader in self.recording.readers():
             files.append(BagFile(reader.path, reader.storage, reader.topics, reader.statistics))
             warnings.extend(reader.warnings)
         return tuple(files), tuple(dict.fromkeys(warnings))
@@ -350,14 +349,14 @@ class Bag:
 def open_bag(
     path: str | os.PathLike[str],
     *,
-    interfaces: Iterable[str | os.PathLike[str]] = (),
+    include: Iterable[str | os.PathLike[str]] = (),
     distro: str | None = None,
 ) -> Bag:
     """Open a bag for reading.
 
     Args:
         path: A folder of rosbag2, an `.mcap` or `.db3` file, or a ROS 1 `.bag`.
-        interfaces: Folders of packages that have the definitions that the bag does not have.
+        include: Folders of packages that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else; by default
             `$ROS_DISTRO`, else the newest.
 
@@ -367,6 +366,6 @@ def open_bag(
     Raises:
         BagError: There is no bag, or it cannot be read.
     """
-    bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in interfaces], distro)
+    bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in include], distro)
     bag.files  # noqa: B018  # what is wrong with a file is said here
     return bag

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from datetime import datetime
 from functools import wraps
@@ -70,6 +71,45 @@ def setting_option(name: str) -> Callable[[Command], Command]:
 def source_options(command: Command) -> Command:
     """Add the options that say where definitions come from."""
     return setting_option("include")(setting_option("distro")(command))
+
+
+def bag_source_options(command: Command) -> Command:
+    """Add the options that say where definitions come from that a bag does not have."""
+    setting = SETTINGS["include"]
+    names = ("--interfaces", "--include", "-I")
+    include = click.option(*names, "include", type=_PATH, multiple=True, help=setting.help)
+    return include(setting_option("distro")(command))
+
+
+_TIME = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|[+-]\d\d:\d\d)")
+
+
+def _nanoseconds(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
+    """Return a point in time in nanoseconds since 1970, which is given so, or in ISO 8601 with a time zone."""
+    if text is None:
+        return None
+    if text.isascii() and text.isdigit():
+        return int(text)
+    found = _TIME.fullmatch(text)
+    try:
+        if found is None:
+            raise ValueError
+        seconds, fraction, zone = found.groups()
+        date = datetime.fromisoformat(seconds + zone.replace("Z", "+00:00"))
+    except ValueError:
+        example = "2026-01-02T03:04:05.678Z, or nanoseconds since 1970"
+        raise click.BadParameter(f"{text!r} is not a time with a time zone, such as {example}") from None
+    return to_nanoseconds(date) + int((fraction or "").ljust(9, "0"))
+
+
+def time_options(command: Command) -> Command:
+    """Add the options that choose a part of a bag; they reach the command as nanoseconds since 1970, or None."""
+    help_text = "Only messages recorded {}: 2026-01-02T03:04:05.678Z, or nanoseconds since 1970."
+    start, end = (
+        click.option(f"--{name}", metavar="TIME", callback=_nanoseconds, help=help_text.format(when))
+        for name, when in (("start", "at this time or later"), ("end", "before this time"))
+    )
+    return start(end(command))
 
 
 def plugin_option(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,0 +1,39 @@
+"""`rosidl-proto bag cat`."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import click
+
+from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+
+
+@click.command("cat")
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.argument("topics", nargs=-1, required=True, metavar="TOPIC...")
+@click.option("--fields", metavar="A.B,C", help="Print only these fields of the messages.")
+@time_options
+@click.option("--limit", type=click.IntRange(min=0), help="Print so many messages at most.")
+@bag_source_options
+def command(
+    bag: Path,
+    topics: tuple[str, ...],
+    fields: str | None,
+    start: int | None,
+    end: int | None,
+    limit: int | None,
+    include: tuple[Path, ...],
+    distro: str | None,
+) -> None:
+    """Print the messages of topics in BAG as JSON, one on each line, in the order in which they were recorded."""
+    from rosidl_adapter_proto.bags.bag import open_bag
+    from rosidl_adapter_proto.bags.message_json import chosen_fields, message_json
+
+    names = None if fields is None else [name.strip() for name in fields.split(",")]
+    chosen = chosen_fields(names or ())
+    with open_bag(bag, include=include, distro=distro) as opened:
+        messages = opened.messages(topics, start=start, end=end, fields=names)
+        for recorded in islice(messages, limit):
+            click.echo(message_json(recorded, chosen))
