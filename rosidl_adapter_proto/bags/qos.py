@@ -27,12 +27,25 @@ _POLICIES: Mapping[str, tuple[str, ...]] = {
         "best_available",
     ),
 }
+_ORDER = (
+    "history",
+    "depth",
+    "reliability",
+    "durability",
+    "deadline",
+    "lifespan",
+    "liveliness",
+    "liveliness_lease_duration",
+    "avoid_ros_namespace_conventions",
+    "sec",
+    "nsec",
+)
 _SCALAR = re.compile(r"[\w.+-]+", re.ASCII)
 
 
 def numbered_qos(text: str) -> str:
-    """Return the text of QoS profiles with numbers for the names of policies; what is no such text is kept as it is."""
-    if not text or not any(name in text for names in _POLICIES.values() for name in names):
+    """Return QoS profiles with numbers for names, spelled as rosbag2 does; what is no QoS is kept as it is."""
+    if not text:
         return text
     try:
         return qos_text(read_yaml(text, "offered_qos_profiles"), "offered_qos_profiles")
@@ -59,7 +72,7 @@ def _profile(profile: Node, where: str) -> str:
     if not isinstance(profile, dict) or not profile:
         raise BagError(f"{where}: expected a QoS profile, as names and values")
     lines: list[str] = []
-    for name, value in profile.items():
+    for name, value in _in_order(profile):
         if isinstance(value, dict):
             lines.append(f"{name}:")
             lines += [
@@ -68,6 +81,12 @@ def _profile(profile: Node, where: str) -> str:
         else:
             lines.append(f"{name}: {_scalar(name, value, where)}")
     return "- " + "\n  ".join(lines)
+
+
+def _in_order(values: dict[str, Node]) -> list[tuple[str, Node]]:
+    return sorted(
+        values.items(), key=lambda item: _ORDER.index(item[0]) if item[0] in _ORDER else len(_ORDER)
+    )
 
 
 def _scalar(name: str, value: Node, where: str) -> str:

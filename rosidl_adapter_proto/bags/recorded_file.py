@@ -21,6 +21,7 @@ from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.ros1 import Ros1Reader
 from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
@@ -167,6 +168,10 @@ def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
     return McapReader(open_file(path), name, salvage=salvage)
 
 
+def _open_ros1(path: str, name: str, salvage: bool) -> StorageReader:
+    return Ros1Reader(open_file(path), name, salvage=salvage)
+
+
 def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
     return SqliteReader(path, name, salvage=salvage)
 
@@ -174,6 +179,7 @@ def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
 _OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
     MCAP: _open_mcap,
     SQLITE3: _open_sqlite3,
+    ROSBAG: _open_ros1,
 }
 
 
@@ -249,7 +255,7 @@ def _with_metadata(
         if differing:
             names = " and ".join(differing)
             contradictions.append(
-                f"{reader.path}: {topic.name}: {METADATA_FILE} has another {names}; the file counts"
+                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file"
             )
     return topics, contradictions
 

@@ -11,7 +11,7 @@ import shutil
 import sqlite3
 import tempfile
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
@@ -36,7 +36,9 @@ CHUNK_SIZE = 2**20
 """About how many bytes of messages make a chunk."""
 
 MAXIMUM_TOPIC_ID = 2**16 - 1
-_LAST_ROW = 2**63 - 1
+_ROW_SIZE = 64  # bytes of a row beside its message, about
+_FIRST_ROW, _LAST_ROW = -(2**63), 2**63 - 1
+_ERRORS = (sqlite3.Error, UnicodeDecodeError)  # the latter for names of columns
 _DEFINITIONS = "message_definitions"
 _DESCRIPTORS = "protobuf_descriptors"
 
@@ -66,7 +68,7 @@ class SqliteReader:
                 raise BagError(
                     f"{path}: a sqlite3 database, but no bag: it has no tables topics and messages"
                 )
-            self._rows_of_topics, self.topics = self._read_topics()
+            self._topic_ids, self.topics = self._read_topics()
             self.metadata = self._read_metadata()
             self._stack = stack.pop_all()
 
@@ -79,17 +81,19 @@ class SqliteReader:
     @cached_property
     def statistics(self) -> Statistics:
         """What is in the file, counted: a database does not keep it."""
-        ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
-        counts = dict.fromkeys(ids.values(), 0)
-        times: list[int] = []
         query = "SELECT topic_id, count(*), min(timestamp), max(timestamp) FROM messages GROUP BY topic_id"
-        for row, count, first, last in self._query(query):
-            if row not in ids:
-                raise BagError(
-                    f"{self.path}: table messages: {count} messages have topic {row!r}, which is not listed"
-                )
-            counts[ids[row]] = count
-            times += [time for time in (first, last) if isinstance(time, int)]
+        try:
+            groups = self._query(query)
+        except BagError:
+            if not self._salvage:
+                raise
+            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(*self._selecting(EVERYTHING))]
+        counts = dict.fromkeys(self.topics, 0)
+        for topic, count, _, _ in groups:
+            if topic not in self._topic_ids:
+                raise BagError(f"{self.path}: table messages: topic_id {topic!r} is not in the table topics")
+            counts[self._topic_ids[topic]] += count
+        times = [time for group in groups for time in group[2:] if isinstance(time, int)]
         return Statistics(counts, min(times, default=0), max(times, default=0))
 
     def attachments(self) -> Iterator[Attachment]:
@@ -145,10 +149,10 @@ class SqliteReader:
             connection.close()
         return folder / path.name
 
-    def _query(self, query: str, values: Sequence[object] = ()) -> Iterator[tuple[Any, ...]]:
+    def _query(self, query: str) -> list[tuple[Any, ...]]:
         try:
-            yield from self._connection.execute(query, values)
-        except sqlite3.Error as error:
+            return self._connection.execute(query).fetchall()
+        except _ERRORS as error:
             raise BagError(f"{self.path}: {_reason(error)}") from None
 
     def _tables(self) -> list[str]:
@@ -190,16 +194,12 @@ class SqliteReader:
             raise BagError(
                 f"{self.path}: {len(rows)} topics; at most {MAXIMUM_TOPIC_ID} are possible in a file"
             )
-        # A chunk has 16 bits for a topic; the table has 64.
+        # A chunk has 16 bits for it; the table has 64.
         fitting = all(0 < row[0] <= MAXIMUM_TOPIC_ID for row in rows)
-        rows_of_topics = {row[0] if fitting else number: row[0] for number, row in enumerate(rows, start=1)}
+        topic_ids = {row[0]: row[0] if fitting else number for number, row in enumerate(rows, start=1)}
         definitions = self._definitions()
         descriptors = self._descriptors()
-        topics = {
-            topic_id: _topic(row[1:], definitions, descriptors)
-            for topic_id, row in zip(rows_of_topics, rows, strict=True)
-        }
-        return rows_of_topics, topics
+        return topic_ids, {topic_ids[row[0]]: _topic(row[1:], definitions, descriptors) for row in rows}
 
     def _definitions(self) -> dict[str, RecordedDefinition]:
         names = {
@@ -233,11 +233,8 @@ class SqliteReader:
         conditions = ["id > ?", "id <= ?"]
         values: list[int] = []
         if selection.topic_ids is not None:
-            rows = [
-                self._rows_of_topics[topic] for topic in selection.topic_ids if topic in self._rows_of_topics
-            ]
-            conditions.append(f"topic_id IN ({', '.join(map(str, rows))})")
-        # The plus keeps sqlite from sorting whole messages by the index of times.
+            rows = [str(row) for row, topic_id in self._topic_ids.items() if topic_id in selection.topic_ids]
+            conditions.append(f"topic_id IN ({', '.join(rows)})")
         if selection.start_time:
             conditions.append("+timestamp >= ?")
             values.append(min(selection.start_time, _LAST_ROW))
@@ -248,34 +245,80 @@ class SqliteReader:
         where = " AND ".join(conditions)
         return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
-    def _batches(self, query: str, values: list[int]) -> Iterator[list[tuple[Any, ...]]]:
-        rows: list[tuple[Any, ...]] = []
-        size = 0
-        for row in self._query(query, [-_LAST_ROW - 1, _LAST_ROW, *values]):
-            rows.append(row)
-            size += 64 + (len(row[3]) if isinstance(row[3], bytes) else 0)
-            if size >= CHUNK_SIZE:
-                yield rows
-                rows = []
-                size = 0
-        if rows:
-            yield rows
+    def _messages(self, query: str, values: list[int]) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a query of `_selecting`, without damaged ones if the file is to be salvaged."""
+        first = _FIRST_ROW
+        done = 0
+        while True:
+            row = None
+            try:
+                for row in self._connection.execute(query, [first, *values]):
+                    yield row
+                    done += 1
+                return
+            except _ERRORS as error:
+                first = row[0] + 1 if row else first
+                if not self._salvage:
+                    where = f"{self.path}: table messages, from row {first} on"
+                    raise BagError(
+                        f"{where}: {_reason(error)}; {done} messages before it were read"
+                    ) from None
+                reason = _reason(error)
+            # Python asks for the row after a good one before it gives that.
+            row = self._first_row(query, first, values)
+            if row:
+                yield row
+                done += 1
+                first = row[0] + 1
+                continue
+            skipped = self._damaged_rows(query, first, values)
+            last = f"to {first + skipped - 1}" if skipped else "on"
+            self.warnings.append(f"{self.path}: table messages, rows {first} {last} are left out: {reason}")
+            if not skipped:
+                return
+            first += skipped
 
-    def _chunk(self, rows: list[tuple[Any, ...]], ids: Mapping[int, int], done: int) -> StoredChunk:
+    def _damaged_rows(self, query: str, first: int, values: list[int]) -> int:
+        """Return how many row numbers from one on cannot be read; 0 for all."""
+        step = 1
+        while not self._first_row(query, first + step, values):
+            step *= 2
+            if first + step > _LAST_ROW:
+                return 0
+        unreadable = step // 2
+        while step - unreadable > 1:
+            middle = (step + unreadable) // 2
+            if self._first_row(query, first + middle, values):
+                step = middle
+            else:
+                unreadable = middle
+        return step
+
+    def _first_row(self, query: str, first: int, values: list[int]) -> tuple[Any, ...] | None:
+        """Return the first row from one on; None if it cannot be read, or there is none."""
+        try:
+            found: tuple[Any, ...] | None = self._connection.execute(
+                f"{query} LIMIT 1", [first, *values]
+            ).fetchone()
+        except _ERRORS:
+            return None
+        return found
+
+    def _chunk(self, rows: list[tuple[Any, ...]], done: int) -> StoredChunk:
         where = f"{self.path}, table messages, rows {rows[0][0]} to {rows[-1][0]}"
         _, topics, times, messages = zip(*rows, strict=True)
         try:
             log_times = array("Q", times)
-            topic_ids = array("H", [ids[topic] for topic in topics])
+            topic_ids = array("H", [self._topic_ids[topic] for topic in topics])
             data = pack_records(topic_ids, array("I", bytes(4 * len(rows))), log_times, log_times, messages)
         except (TypeError, OverflowError, KeyError):
-            raise self._wrong_row(rows, ids, done) from None
+            raise self._wrong_row(rows, done) from None
         return StoredChunk(where, data, "", len(data), 0, min(log_times), max(log_times), len(rows))
 
-    def _wrong_row(self, rows: list[tuple[Any, ...]], ids: Mapping[int, int], done: int) -> BagError:
+    def _wrong_row(self, rows: list[tuple[Any, ...]], done: int) -> BagError:
         for number, (row, topic, time, data) in enumerate(rows):
             reason = ""
-            if topic not in ids:
+            if topic not in self._topic_ids:
                 reason = f"topic_id {topic!r} is not in the table topics"
             elif not isinstance(time, int) or time < 0:
                 reason = f"timestamp {time!r} is not a time in nanoseconds since 1970"
@@ -302,10 +345,8 @@ def _topic(
     descriptors: Mapping[str, tuple[str, RecordedDefinition]],
 ) -> Topic:
     name, type_name, serialization_format, qos_profiles, type_hash = values
-    # The definition of a service event is that of its service, by the service's name.
-    definition = definitions.get(type_name) or definitions.get(
-        type_name.removesuffix("_Event"), RecordedDefinition()
-    )
+    names = [name for name in definition_names(type_name) if name in definitions]
+    definition = definitions[names[0]] if names else RecordedDefinition()
     schema_name, descriptor = descriptors.get(type_name, ("", RecordedDefinition()))
     protobuf = serialization_format == PROTOBUF
     return Topic(
@@ -320,7 +361,7 @@ def _topic(
     )
 
 
-def _reason(error: sqlite3.Error) -> str:
-    if isinstance(error, sqlite3.DatabaseError) and "not a database" in str(error):
+def _reason(error: Exception) -> str:
+    if "not a database" in str(error):
         return "no sqlite3 database"
     return f"sqlite3 says: {error}"
