@@ -20,6 +20,10 @@ class DefinitionError(Error):
     """An interface definition cannot be found, read or understood."""
 
 
+class MissingDefinitionError(DefinitionError):
+    """There is no definition of a type, or of one that it refers to."""
+
+
 class SchemaError(Error):
     """An interface cannot be mapped to protobuf, or a lock file disagrees with it."""
 

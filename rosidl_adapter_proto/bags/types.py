@@ -12,13 +12,14 @@ from collections.abc import Hashable, Iterable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from rosidl_adapter_proto.bags.descriptors import descriptor_set, recorded_class
 from rosidl_adapter_proto.bags.model import PROTOBUF, RecordedDefinition, Topic
-from rosidl_adapter_proto.errors import BagError, DefinitionError, SchemaError
+from rosidl_adapter_proto.errors import BagError, DefinitionError, MissingDefinitionError, SchemaError
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog, interface_base
-from rosidl_adapter_proto.interfaces.find import Definition, Package, Source
+from rosidl_adapter_proto.interfaces.find import Definition, Package
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.recorded import (
     ENCODINGS,
@@ -34,9 +35,19 @@ from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
 _PROTO_NAME = re.compile(r"(\w+)\.(msg|srv|action)\.pb\.(\w+)")
 _KNOWN_HASH = "RIHS01_"
 _NEVER_CHANGED = {TypeName("builtin_interfaces", "msg", name) for name in ("Time", "Duration")}
-_ADVICE = (
-    "give the folder of its package with --interfaces FOLDER, or the distribution it is from with --distro"
-)
+_ADVICE = "give the folder of its package with --include FOLDER, or the distribution it is from with --distro"
+
+
+class RecordedTypes(NamedTuple):
+    """What there is to generate of a recording.
+
+    Attributes:
+        definitions: The definitions in it.
+        types: The types of its topics: messages, services and actions.
+    """
+
+    definitions: Package
+    types: tuple[TypeName, ...]
 
 
 class BagTypes:
@@ -95,7 +106,7 @@ class BagTypes:
         try:
             return _recorded_class(topic)
         except BagError as error:
-            raise BagError(f"topic {topic.name}: {error}") from None
+            raise _problem(topic, error) from None
 
     def origin(self, topic: Topic) -> str:
         """Return where the definition of a topic's type comes from, for people; errors are those of `schema`."""
@@ -106,6 +117,27 @@ class BagTypes:
         recorded = _recorded(topic)
         return recorded if self._definitions(topic) else ros_definition(self.schema(topic))
 
+    def all(self) -> RecordedTypes:
+        """Return what there is to generate of the recording; protobuf messages that are no ROS types are left out.
+
+        Raises:
+            BagError: Two topics have other definitions of the same type; or, of a topic, as for `schema`.
+        """
+        known: dict[TypeName, tuple[Definition, str]] = {}
+        types: dict[TypeName, None] = {}
+        for topic in self._topics:
+            if topic.serialization_format == PROTOBUF and not _is_ros_type(topic):
+                continue
+            schema = self.schema(topic)
+            types[interface_base(TypeName.parse(schema.type_name))] = None
+            for name, definition in self._definitions(topic).items():
+                other, user = known.setdefault(name, (definition, topic.name))
+                if not _is_same(definition, other):
+                    raise BagError(
+                        f"{name} is not the same in topics {user} and {topic.name}: code can only have one version"
+                    )
+        return RecordedTypes({name: each for name, (each, _) in known.items()}, tuple(types))
+
     def _schema(self, topic: Topic) -> Schema:
         try:
             name = _ros_type(topic)
@@ -113,8 +145,10 @@ class BagTypes:
             schema = self._registry(name, own)[name]
             self._check_version(topic, schema, own)
             return _with_recorded_class(schema, topic) if topic.serialization_format == PROTOBUF else schema
+        except MissingDefinitionError as error:
+            raise _problem(topic, f"{error}; {_ADVICE}") from None
         except (BagError, DefinitionError, SchemaError) as error:
-            raise BagError(f"topic {topic.name}: {error}") from None
+            raise _problem(topic, error) from None
 
     def _check_version(self, topic: Topic, schema: Schema, own: Package) -> None:
         """Compare a definition with the version that was recorded: with another one, all data would be wrong."""
@@ -129,7 +163,7 @@ class BagTypes:
         elif schema.type_hash != topic.type_hash:
             difference = f"was recorded with the type hash {topic.type_hash}, but has {schema.type_hash}"
             if foreign:
-                raise BagError(f"{schema.type_name} {difference} with {origins}: {_ADVICE}")
+                raise BagError(f"it {difference} with {origins}: {_ADVICE}")
             self._warn(f"{schema.type_name} {difference} with the definition in the recording, which is used")
 
     def _warn(self, text: str) -> None:
@@ -140,13 +174,12 @@ class BagTypes:
         """Return the definitions that the recording has for a topic; none if it has none that could be read."""
         name = _ros_type(topic)
         definitions = _recorded_definitions(topic, name)
-        if _recorded(topic).data.strip() or self._is_empty_message(topic, name, definitions):
-            return definitions
-        return {}
+        is_blank = not _recorded(topic).data.strip()
+        return {} if is_blank and not self._is_empty_message(topic, name, definitions) else definitions
 
     def _is_empty_message(self, topic: Topic, name: TypeName, definitions: Package) -> bool:
         """Tell whether a text without fields is the definition of a message without fields, or only left out."""
-        if topic.type_hash.startswith(_KNOWN_HASH):
+        if definitions and topic.type_hash.startswith(_KNOWN_HASH):
             return Catalog((recorded_source(definitions),)).hash(name) == topic.type_hash
         return interface_base(name) not in self._elsewhere.packages.get(name.package, {})
 
@@ -160,18 +193,9 @@ class BagTypes:
         return found
 
     def _registry(self, name: TypeName, own: Package) -> TypeRegistry:
-        """Return the registry of a type whose definitions are those, and else those of other topics.
-
-        Raises:
-            BagError: There is none.
-        """
-        base = interface_base(name)
-        definitions = own or (self._all_definitions if base in self._all_definitions else {})
+        """Return the registry of a type with its own definitions, or with those of other topics if it has none."""
+        definitions = own or (self._all_definitions if interface_base(name) in self._all_definitions else {})
         catalog = Catalog((recorded_source(definitions), *self._elsewhere.sources))
-        if base not in catalog.packages.get(name.package, {}):
-            raise BagError(
-                f"there is no definition of {name}: it is not in the recording; {self._elsewhere.places()}; {_ADVICE}"
-            )
         is_event = name.namespace != "msg" and name.name.endswith("_Event")
         return TypeRegistry(catalog, events=is_event)
 
@@ -186,35 +210,8 @@ def ros_definition(schema: Schema) -> RecordedDefinition:
     return RecordedDefinition(*recorded_text(schema.registry.definitions(schema.type_name)))
 
 
-def recorded_types(topics: Iterable[Topic]) -> tuple[Source, tuple[TypeName, ...]]:
-    """Return the definitions that recordings have for some topics, and every type that these have or need.
-
-    Topics of protobuf messages that are no ROS types are left out.
-
-    Raises:
-        BagError: Two topics have other definitions of the same type, or one has a definition that is none.
-    """
-    known: dict[TypeName, Definition] = {}
-    users: dict[TypeName, Topic] = {}
-    names: dict[TypeName, None] = {}
-    for topic in topics:
-        try:
-            name = _ros_type(topic)
-        except BagError:
-            continue
-        try:
-            definitions = _recorded_definitions(topic, name)
-        except DefinitionError as error:
-            raise BagError(f"topic {topic.name}: {error}") from None
-        names.update(dict.fromkeys(definitions or [interface_base(name)]))
-        for each, definition in definitions.items():
-            if not _is_same(known.setdefault(each, definition), definition):
-                raise BagError(
-                    f"{each} is not the same in topics {users[each].name} and {topic.name}: code can have only one "
-                    "version of it"
-                )
-            users.setdefault(each, topic)
-    return recorded_source(known), tuple(names)
+def _problem(topic: Topic, reason: object) -> BagError:
+    return BagError(f"topic {topic.name} ({topic.type_name or topic.schema_name}): {reason}")
 
 
 def _is_same(one: Definition, other: Definition) -> bool:
@@ -242,7 +239,9 @@ def _recorded_definitions(topic: Topic, name: TypeName) -> Package:
     recorded = _recorded(topic)
     if recorded.encoding not in ENCODINGS:  # unknown, as rosbag2 says where it has found none
         return {}
-    return recorded_definitions(recorded.data, recorded.encoding, str(name), f"the definition of {name}")
+    return recorded_definitions(
+        recorded.data, recorded.encoding, str(name), f"definition of topic {topic.name}"
+    )
 
 
 def _definitions_of(schema: Schema) -> list[Definition]:
@@ -259,16 +258,18 @@ def _ros_type(topic: Topic) -> TypeName:
     Raises:
         BagError: It has none.
     """
-    text = topic.type_name
-    if topic.serialization_format == PROTOBUF and "/" not in text:
-        match = _PROTO_NAME.fullmatch(topic.schema_name)
-        if match is None:
-            raise BagError(
-                f"its messages are protobuf messages {topic.schema_name or text!r}, which have no ROS type: they can "
-                "be read, but not converted"
-            )
-        text = "/".join(match.groups())
-    return recorded_type_name(text)
+    if topic.serialization_format != PROTOBUF or "/" in topic.type_name:
+        return recorded_type_name(topic.type_name)
+    match = _PROTO_NAME.fullmatch(topic.schema_name)
+    if match is None:
+        raise BagError(
+            "its messages are protobuf messages of no ROS type: they can be read, but not converted"
+        )
+    return TypeName(*match.groups())
+
+
+def _is_ros_type(topic: Topic) -> bool:
+    return "/" in topic.type_name or _PROTO_NAME.fullmatch(topic.schema_name) is not None
 
 
 def _recorded_class(topic: Topic) -> MessageClass:

@@ -41,7 +41,11 @@ def find_catalog(include: Iterable[Path], distro: str | None, first: Sequence[So
 
 
 def find_request(
-    what: Sequence[str], include: Iterable[Path], distro: str | None, dependencies: bool
+    what: Sequence[str],
+    include: Iterable[Path],
+    distro: str | None,
+    dependencies: bool,
+    first: Sequence[Source] = (),
 ) -> tuple[Request, Catalog]:
     """Return what the arguments of a command ask for, and where definitions come from.
 
@@ -50,6 +54,7 @@ def find_request(
         include: Folders to find definitions in.
         distro: The distribution of the embedded store.
         dependencies: Whether dependencies are asked for as well.
+        first: Where definitions come from before all else.
     """
     given: list[Source] = []
     packages: list[str] = []
@@ -67,7 +72,7 @@ def find_request(
             packages += source.packages
         else:
             names.append(text)
-    catalog = find_catalog(include, distro, given)
+    catalog = find_catalog(include, distro, [*first, *given])
     for text in names:
         if text not in catalog.packages and os.path.isdir(text):
             source = folder_source(Path(text))

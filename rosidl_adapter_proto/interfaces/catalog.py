@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import chain
 from typing import cast
 
-from rosidl_adapter_proto.errors import DefinitionError
+from rosidl_adapter_proto.errors import DefinitionError, MissingDefinitionError
 from rosidl_adapter_proto.interfaces.description import TypeDescription, describe, structs, type_hash
 from rosidl_adapter_proto.interfaces.find import Definition, Package, Source
 from rosidl_adapter_proto.interfaces.model import NAMESPACES, Message, TypeName
@@ -54,7 +54,7 @@ class Catalog:
             DefinitionError: No source has it; the message names similar ones and where was looked.
         """
         if name not in self.packages:
-            raise DefinitionError(
+            raise MissingDefinitionError(
                 f"package {name!r} was not found{near_misses(name, self.packages)}; {self.places()}"
             )
         return self.packages[name]
@@ -71,7 +71,7 @@ class Catalog:
             origin = next(iter(package.values())).origin
             others = [each.origin for each in self.sources if name in each.packages.get(name.package, {})]
             hint = f"; {others[0]} has it, but comes later" if others else near_types(str(name), package)
-            raise DefinitionError(
+            raise MissingDefinitionError(
                 f"type {str(name)!r} was not found in package {name.package!r} of {origin}{hint}"
             )
         return package[owner]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from rosidl_adapter_proto.errors import DefinitionError
+from rosidl_adapter_proto.errors import DefinitionError, MissingDefinitionError
 from rosidl_adapter_proto.interfaces.catalog import Catalog, near_misses, near_types
 from rosidl_adapter_proto.interfaces.model import Interface, Message, TypeName, messages, references
 
@@ -152,4 +152,4 @@ def _missing_error(catalog: Catalog, missing: Mapping[str, list[str]]) -> Defini
         else:
             near = near_misses(package, catalog.packages)
         lines.append(f"{name} was not found, but {users[0]}{more} need{'' if more else 's'} it{near}")
-    return DefinitionError("\n".join([*lines, catalog.places()]))
+    return MissingDefinitionError("\n".join([*lines, catalog.places()]))

@@ -24,7 +24,7 @@ ROS1MSG = "ros1msg"
 ENCODINGS = (ROS2MSG, ROS2IDL, ROS1MSG)
 """The encodings that are read."""
 
-MAXIMUM_SIZE = 16 * 2**20
+MAXIMUM_SIZE = 4 * 2**20
 """The longest text that is read, in bytes."""
 
 MAXIMUM_DEFINITIONS = 10_000

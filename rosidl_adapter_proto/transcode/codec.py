@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 from google.protobuf.descriptor import Descriptor
 from google.protobuf.message import EncodeError, Message
 
-from rosidl_adapter_proto.errors import ConversionError, wrong_message
+from rosidl_adapter_proto.errors import ConversionError, SchemaError, wrong_message
 from rosidl_adapter_proto.interfaces.description import TypeDescription
 from rosidl_adapter_proto.transcode import _core
 from rosidl_adapter_proto.transcode.error import TranscodeError
@@ -91,7 +91,8 @@ class Transcoder(_core.Transcoder):
             is skipped. Such a transcoder does not write CDR.
 
     Raises:
-        SchemaError: The description and the descriptor do not fit together, or the type has no such field.
+        SchemaError: The description and the descriptor do not fit together, the type has no such field, or its messages
+            are too large.
         TypeError: `fields` is one text.
     """
 
@@ -109,7 +110,10 @@ class Transcoder(_core.Transcoder):
         plan = build_plan(
             type_description, descriptor, omit_empty_messages=omit_empty_messages, fields=fields
         )
-        super().__init__(plan.pack(), plan.type_name, size_limit)
+        try:
+            super().__init__(plan.pack(), plan.type_name, size_limit)
+        except ValueError as error:  # such as an array that makes each message too large
+            raise SchemaError(f"{plan.type_name}: {error}") from None
 
     def cdr_to_proto_batch(
         self,

@@ -235,7 +235,7 @@ def test_the_settings_are_the_options_of_the_commands() -> None:
         for parameter in generate.command.params
     }
 
-    assert names - {"check", "renumber", "verbose"} == set(SETTINGS)
+    assert names - {"check", "from-bag", "renumber", "verbose"} == set(SETTINGS)
 
 
 @pytest.mark.parametrize("text", ["", "tool = 1", "[tool]\nother = 1", "[tool.rosidl-proto]"])

@@ -267,7 +267,7 @@ def test_ros1() -> None:
             " " * (MAXIMUM_SIZE + 1),
             "a/msg/B",
             "ros2msg",
-            "a.mcap: the definition has more than 16777216 bytes",
+            "a.mcap: the definition has more than 4194304 bytes",
         ),
         (
             "".join(f"{RULE}\nMSG: a/B{number}\n" for number in range(MAXIMUM_DEFINITIONS + 1)),
