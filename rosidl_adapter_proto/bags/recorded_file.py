@@ -21,8 +21,9 @@ from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.places import find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
-from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
+from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteReader
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
 from rosidl_adapter_proto.errors import BagError
@@ -94,7 +95,7 @@ def open_file(path: str) -> BinaryIO:
         BagError: It cannot be opened.
     """
     try:
-        return open(path, "rb")
+        return find_place(path).open("rb")
     except OSError as error:
         raise BagError(f"{path}: {error.strerror}") from None
 
@@ -112,6 +113,8 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
     """
     with ExitStack() as stack:
         path = _decompressed(file.path, stack) if file.compressed else file.path
+        if file.storage == SQLITE3:  # whose library reads nothing but files of this machine
+            path = str(stack.enter_context(local_copy(find_place(path), JOURNAL_SUFFIXES)))
         reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage))
         return _OpenedFile(reader, metadata, stack)
 
@@ -148,7 +151,7 @@ def create_file(
 def _decompressed(path: str, stack: ExitStack) -> str:
     """Return a temporary file with what another has compressed."""
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-"))
-    target = Path(folder, Path(path).name.removesuffix(ZSTD_SUFFIX))
+    target = Path(folder, find_place(path).name.removesuffix(ZSTD_SUFFIX))
     room = shutil.disk_usage(folder).free - _SPARE_SPACE
     with open_file(path) as source, target.open("wb") as file:
         try:
