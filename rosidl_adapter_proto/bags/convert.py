@@ -18,7 +18,7 @@ from rosidl_adapter_proto.bags.output import check_new, written_aside
 from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFIXES, ZSTD_SUFFIX
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.routes import formats, selected_topics
-from rosidl_adapter_proto.converters import Converter, ConverterRegistry
+from rosidl_adapter_proto.converters import ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.time import to_nanoseconds
 
@@ -110,9 +110,6 @@ def _convert(
     _check_names([*settings.topics, *settings.excluded_topics], topics)
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
-    Converter(
-        source_format, target_format, settings.registry
-    )  # whether there is one, before anything is written
     size = sum(os.path.getsize(file.path) for file in recording.files)
     result = ConversionResult(warnings=recording.warnings, source_size=size)
     written: list[WrittenFile] = []

@@ -76,7 +76,7 @@ def _profile(profile: Node, where: str) -> str:
         if isinstance(value, dict):
             lines.append(f"{name}:")
             lines += [
-                f"  {part}: {_scalar(part, number, f'{where}.{name}')}" for part, number in value.items()
+                f"  {part}: {_scalar(part, number, f'{where}.{name}')}" for part, number in _in_order(value)
             ]
         else:
             lines.append(f"{name}: {_scalar(name, value, where)}")

@@ -218,7 +218,10 @@ class _OpenedFile:
     ) -> Iterator[StoredChunk]:
         for chunk in self._reader.chunks(selection, in_time_order=in_time_order):
             if self._messages_compressed:
-                yield from _with_plain_messages(chunk, selection)
+                # In the order of time, pieces of a chunk would have to stand between those of others.
+                yield from _with_plain_messages(
+                    chunk, selection, MAXIMUM_CHUNK_SIZE if in_time_order else _PIECE_SIZE
+                )
             else:
                 yield chunk
 
@@ -263,7 +266,7 @@ def _with_metadata(
     return topics, contradictions
 
 
-def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[StoredChunk]:
+def _with_plain_messages(chunk: StoredChunk, selection: Selection, piece_size: int) -> Iterator[StoredChunk]:
     """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
     records = read_records(records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time)
     first = 0
@@ -272,8 +275,8 @@ def _with_plain_messages(chunk: StoredChunk, selection: Selection) -> Iterator[S
     for index in range(len(records)):
         messages.append(_decompressed_message(records, index, chunk.where))
         size += memoryview(messages[-1]).nbytes
-        if size >= _PIECE_SIZE or index == len(records) - 1:
-            yield _plain_chunk(records, first, messages, chunk.where)
+        if size >= piece_size or index == len(records) - 1:
+            yield _plain_chunk(chunk, records, first, messages)
             first, size, messages = index + 1, 0, []
 
 
@@ -289,10 +292,12 @@ def _decompressed_message(records: Records, index: int, where: str) -> bytes:
     return plain
 
 
-def _plain_chunk(records: Records, first: int, messages: list[Buffer], where: str) -> StoredChunk:
+def _plain_chunk(chunk: StoredChunk, records: Records, first: int, messages: list[Buffer]) -> StoredChunk:
     chosen = slice(first, first + len(messages))
     times = array("Q", records.log_times[chosen])
     data = pack_records(
         records.topic_ids[chosen], records.sequences[chosen], times, records.publish_times[chosen], messages
     )
-    return StoredChunk(where, data, "", len(data), 0, min(times), max(times), len(messages))
+    return StoredChunk(
+        chunk.where, data, "", len(data), 0, min(times), max(times), len(messages), chunk.position
+    )

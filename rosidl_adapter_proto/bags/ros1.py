@@ -45,6 +45,7 @@ class _Contents:
         counts: How many messages each topic has.
         times: When the first and the last message were recorded; empty without messages.
         chunk_times: When the first and the last message of each chunk were recorded, by its place in the file.
+        loose_start: When the first message that is in no chunk was recorded; None if there is none.
     """
 
     topics: dict[int, Topic] = field(default_factory=dict)
@@ -52,6 +53,7 @@ class _Contents:
     counts: dict[int, int] = field(default_factory=dict)
     times: tuple[int, ...] = ()
     chunk_times: dict[int, tuple[int, int]] = field(default_factory=dict)
+    loose_start: int | None = None
     _known: dict[tuple[str, str, bytes], int] = field(default_factory=dict)
 
     def topic_id(self, number: int, where: str) -> int:
@@ -94,10 +96,10 @@ class _Messages:
         self.data.append(record.data())
         self.size += record.size
 
-    def chunk(self, where: str) -> StoredChunk:
+    def chunk(self, where: str, position: int) -> StoredChunk:
         count = len(self.data)
         data = pack_records(self.topic_ids, array("I", bytes(4 * count)), self.times, self.times, self.data)
-        return StoredChunk(where, data, "", len(data), 0, min(self.times), max(self.times), count)
+        return StoredChunk(where, data, "", len(data), 0, min(self.times), max(self.times), count, position)
 
 
 class Ros1Reader:
@@ -144,36 +146,59 @@ class Ros1Reader:
         """Yield nothing: a ROS 1 bag has none."""
         return iter(())
 
-    def chunks(self, selection: Selection = EVERYTHING) -> Iterator[StoredChunk]:
-        """Yield the chunks of the bag whose times a selection has, in the order of the file.
+    def chunks(
+        self, selection: Selection = EVERYTHING, *, in_time_order: bool = False
+    ) -> Iterator[StoredChunk]:
+        """Yield the chunks of the bag whose times a selection has; see `StorageReader.chunks`.
 
         Raises:
             BagError: The bag is damaged; the message says where.
         """
-        loose = _Messages()  # of the chunk that a recorder was writing when it was killed
+        if in_time_order:
+            yield from self._chunks_in_time_order(selection)
+            return
         for record in self._records(len(_MAGIC)):
-            messages = _Messages() if record.operation == Operation.CHUNK else loose
-            if messages is not loose and self._selected(record, selection):
-                self._add_chunk(record, messages)
-            elif record.operation == Operation.MESSAGE:
-                with self._tolerating():
-                    loose.add(record, self._contents)
-            if messages.data and (messages is not loose or loose.size >= _PIECE_SIZE):
-                yield messages.chunk(record.where)
-                loose = _Messages() if messages is loose else loose
-        if loose.data:
-            yield loose.chunk(f"{self.path}, the messages at its end")
+            if record.operation == Operation.CHUNK and self._selected(record.place, selection):
+                yield from self._chunk(record)
+        if self._contents.loose_start is not None:
+            yield from self._loose_chunks(_PIECE_SIZE)
 
-    def _add_chunk(self, chunk: Record, messages: _Messages) -> None:
+    def _chunks_in_time_order(self, selection: Selection) -> Iterator[StoredChunk]:
+        starts = {place: times[0] for place, times in self._contents.chunk_times.items()}
+        loose = self._contents.loose_start
+        if loose is not None:
+            starts[self._source.size] = loose
+        for place in sorted(starts, key=starts.__getitem__):
+            if place == self._source.size:
+                yield from self._loose_chunks(self._source.size)  # as one, since others may lie between
+            elif self._selected(place, selection):
+                with self._tolerating():
+                    yield from self._chunk(self._source.record(place))
+
+    def _chunk(self, chunk: Record) -> Iterator[StoredChunk]:
+        messages = _Messages()
         with self._tolerating():
             for record in _chunk_records(chunk):
                 if record.operation == Operation.MESSAGE:
                     messages.add(record, self._contents)
+        if messages.data:
+            yield messages.chunk(chunk.where, chunk.place)
 
-    def _selected(self, chunk: Record, selection: Selection) -> bool:
-        first, last = self._contents.chunk_times.get(
-            chunk.place, (selection.start_time, selection.start_time)
-        )
+    def _loose_chunks(self, size: int) -> Iterator[StoredChunk]:
+        """Yield the messages of the chunk that the recorder was writing when it was killed: they are in no chunk."""
+        messages = _Messages()
+        for record in self._records(len(_MAGIC)):
+            if record.operation == Operation.MESSAGE:
+                with self._tolerating():
+                    messages.add(record, self._contents)
+                if messages.size >= size:
+                    yield messages.chunk(record.where, record.place)
+                    messages = _Messages()
+        if messages.data:
+            yield messages.chunk(f"{self.path}, the messages at its end", self._source.size)
+
+    def _selected(self, place: int, selection: Selection) -> bool:
+        first, last = self._contents.chunk_times.get(place, (selection.start_time, selection.start_time))
         return last >= selection.start_time and (selection.end_time is None or first < selection.end_time)
 
     def _records(self, start: int) -> Iterator[Record]:
@@ -241,16 +266,22 @@ class Ros1Reader:
 
     def _scan(self) -> None:
         for record in self._records(len(_MAGIC)):
+            times: list[int] = []
             with self._tolerating():
                 for inner in _chunk_records(record) if record.operation == Operation.CHUNK else (record,):
-                    self._note(inner)
-
-    def _note(self, record: Record) -> None:
-        if record.operation == Operation.CONNECTION:
-            self._contents.add_connection(record)
-        elif record.operation == Operation.MESSAGE:
-            self._contents.add_messages(record.number(b"conn"), 1, record.where)
-            self._contents.add_times(record.time(b"time"))
+                    if inner.operation == Operation.CONNECTION:
+                        self._contents.add_connection(inner)
+                    elif inner.operation == Operation.MESSAGE:
+                        self._contents.add_messages(inner.number(b"conn"), 1, inner.where)
+                        times = [min([*times, inner.time(b"time")]), max([*times, inner.time(b"time")])]
+            if not times:
+                continue
+            self._contents.add_times(*times)
+            if record.operation == Operation.CHUNK:
+                self._contents.chunk_times[record.place] = times[0], times[1]
+            else:
+                loose = self._contents.loose_start
+                self._contents.loose_start = times[0] if loose is None else min(loose, times[0])
 
 
 def _chunk_records(chunk: Record) -> Iterator[Record]:

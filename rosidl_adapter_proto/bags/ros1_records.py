@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import enum
-import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rosidl_adapter_proto.errors import BagError
 
 _MAXIMUM_HEADER_SIZE = 2**20
-_U32 = struct.Struct("<I")
 
 
 class Operation(enum.IntEnum):
@@ -38,17 +36,6 @@ class Source:
     size: int
     read: Callable[[int, int], memoryview] = field(repr=False)
 
-    def piece(self, start: int, size: int, what: str) -> memoryview:
-        """Return a piece, whose size a record says."""
-        self.check(start, size, what)
-        return self.read(start, size)
-
-    def check(self, start: int, size: int, what: str) -> None:
-        """Check that a piece is inside."""
-        missing = start + size - self.size
-        if missing > 0:
-            raise BagError(f"{self.where} at byte {start}: cut off: {missing} bytes of {what} are missing")
-
     def records(self, start: int) -> Iterator[Record]:
         """Yield the records from a place on."""
         while start < self.size:
@@ -58,18 +45,27 @@ class Source:
 
     def record(self, start: int) -> Record:
         """Return the record at a place."""
-        (header_size,) = _U32.unpack(self.piece(start, 4, "the size of a record's header"))
+        header_size = self._size_at(start, start)
         if header_size > _MAXIMUM_HEADER_SIZE:
             raise BagError(
                 f"{self.where} at byte {start}: damaged: the header of a record has {header_size} bytes"
             )
-        fields = read_fields(
-            self.piece(start + 4, header_size, "a record's header"), f"{self.where} at byte {start}"
-        )
-        begin = start + 4 + header_size
-        (size,) = _U32.unpack(self.piece(begin, 4, "the size of a record's data"))
-        self.check(begin + 4, size, "a record's data")
-        return Record(self, start, fields, begin + 4, size)
+        data_start = start + 4 + header_size + 4
+        size = self._size_at(data_start - 4, start)
+        self._check(data_start + size, start)
+        fields = read_fields(self.read(start + 4, header_size), f"{self.where} at byte {start}")
+        return Record(self, start, fields, data_start, size)
+
+    def _size_at(self, place: int, record: int) -> int:
+        self._check(place + 4, record)
+        return int.from_bytes(self.read(place, 4), "little")
+
+    def _check(self, end: int, record: int) -> None:
+        missing = end - self.size
+        if missing > 0:
+            raise BagError(
+                f"{self.where} at byte {record}: cut off: at least {missing} bytes of a record are missing"
+            )
 
 
 @dataclass(frozen=True)

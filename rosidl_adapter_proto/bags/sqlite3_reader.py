@@ -89,7 +89,7 @@ class SqliteReader:
         except BagError:
             if not self._salvage:
                 raise
-            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(*self._selecting(EVERYTHING))]
+            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(EVERYTHING)]
         counts = dict.fromkeys(self.topics, 0)
         for topic, count, _, _ in groups:
             if topic not in self._topic_ids:
@@ -110,12 +110,18 @@ class SqliteReader:
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
-        query, values = self._selecting(selection, in_time_order)
-        ids = {row: topic_id for topic_id, row in self._rows_of_topics.items()}
-        done = 0
-        for rows in self._batches(query, values):
-            yield self._chunk(rows, ids, done)
-            done += len(rows)
+        rows: list[tuple[Any, ...]] = []
+        size = done = 0
+        for row in self._messages(selection, in_time_order):
+            rows.append(row)
+            size += _ROW_SIZE + (len(row[3]) if isinstance(row[3], bytes) else 0)
+            if size >= CHUNK_SIZE:
+                yield self._chunk(rows, done)
+                done += len(rows)
+                rows = []
+                size = 0
+        if rows:
+            yield self._chunk(rows, done)
 
     def _open(self, path: Path, stack: ExitStack) -> sqlite3.Connection:
         if not path.is_file():
@@ -231,24 +237,29 @@ class SqliteReader:
         return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
 
     def _selecting(self, selection: Selection, in_time_order: bool) -> tuple[str, list[int]]:
-        """Return the query for the messages of a selection that come after a row and up to another, and its values."""
-        conditions = ["id > ?", "id <= ?"]
+        """Return the query for the messages of a selection, and its values after the first, which is a row to begin at.
+
+        A plus keeps sqlite from sorting whole messages by the index of times.
+        """
+        time = "timestamp" if in_time_order else "+timestamp"
+        conditions = ["id >= ?"]
         values: list[int] = []
         if selection.topic_ids is not None:
             rows = [str(row) for row, topic_id in self._topic_ids.items() if topic_id in selection.topic_ids]
             conditions.append(f"topic_id IN ({', '.join(rows)})")
         if selection.start_time:
-            conditions.append("+timestamp >= ?")
+            conditions.append(f"{time} >= ?")
             values.append(min(selection.start_time, _LAST_ROW))
         if selection.end_time is not None:
-            conditions.append("+timestamp < ?")
+            conditions.append(f"{time} < ?")
             values.append(min(selection.end_time, _LAST_ROW))
         order = "timestamp, id" if in_time_order else "id"
         where = " AND ".join(conditions)
         return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
-    def _messages(self, query: str, values: list[int]) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of a query of `_selecting`, without damaged ones if the file is to be salvaged."""
+    def _messages(self, selection: Selection, in_time_order: bool = False) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of a selection; in the order of the table, damaged ones are left out to salvage a file."""
+        query, values = self._selecting(selection, in_time_order)
         first = _FIRST_ROW
         done = 0
         while True:
@@ -260,7 +271,7 @@ class SqliteReader:
                 return
             except _ERRORS as error:
                 first = row[0] + 1 if row else first
-                if not self._salvage:
+                if not self._salvage or in_time_order:
                     where = f"{self.path}: table messages, from row {first} on"
                     raise BagError(
                         f"{where}: {_reason(error)}; {done} messages before it were read"

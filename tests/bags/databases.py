@@ -91,10 +91,10 @@ def database(path: Path, schema: int = 4, rows: Iterable[Row] = ROWS, more: str 
     return path
 
 
-def rows_of(reader: StorageReader, selection: Selection = EVERYTHING) -> list[Row]:
+def rows_of(reader: StorageReader, selection: Selection = EVERYTHING, **options: bool) -> list[Row]:
     """Return the messages of a reader."""
     rows: list[Row] = []
-    for chunk in reader.chunks(selection):
+    for chunk in reader.chunks(selection, **options):
         records = read_records(
             records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time
         )

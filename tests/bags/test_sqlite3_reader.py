@@ -67,6 +67,15 @@ def test_a_selection_is_read_alone(tmp_path: Path, selection: Selection) -> None
         assert sum(chunk.message_count or 0 for chunk in reader.chunks(selection)) == len(expected)
 
 
+def test_messages_are_read_in_the_order_of_time(tmp_path: Path) -> None:
+    with SqliteReader(str(database(tmp_path / "a.db3"))) as reader:
+        in_order = sorted(ROWS, key=lambda row: row.time)
+        assert rows_of(reader, in_time_order=True) == in_order
+        selection = Selection(frozenset({1}), 1100, 1200)
+        expected = [row for row in in_order if row.topic == "/a" and 1100 <= row.time < 1200]
+        assert rows_of(reader, selection, in_time_order=True) == expected
+
+
 def test_chunks_are_bounded_and_say_where_they_are(tmp_path: Path) -> None:
     rows = [Row("/a", i, bytes(CHUNK_SIZE // 4)) for i in range(10)] + [Row("/b", 10, bytes(3 * CHUNK_SIZE))]
     path = database(tmp_path / "a.db3", rows=rows)
