@@ -225,11 +225,23 @@ def write_mcap(
         writer.finish()
 
 
-def write_folder(path: Path, messages: Iterable[Recorded], *, storage: str = "sqlite3") -> None:
-    """Write a folder as rosbag2 does, with sqlite3 or MCAP in it."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
+def write_folder(
+    path: Path, messages: Iterable[Recorded], *, storage: str = "sqlite3", compression: str = ""
+) -> None:
+    """Write a folder as rosbag2 does.
 
-    with Writer(path, version=8, storage_plugin=StoragePlugin[storage.upper()]) as writer:
+    Args:
+        path: The folder.
+        messages: What is in it.
+        storage: `sqlite3` or `mcap`.
+        compression: Whether each `file`, each `message` or nothing is compressed with zstd.
+    """
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+    plain = Writer(path, version=8, storage_plugin=StoragePlugin[storage.upper()])
+    if compression:
+        plain.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
+    with plain as writer:
         connections: dict[Stream, Any] = {}
         for each in messages:
             if each.stream not in connections:

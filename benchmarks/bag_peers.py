@@ -190,9 +190,12 @@ def read_with_rosbags(source: Path, count: int) -> int:
 
 def read_with_mcap_ros2(source: Path, count: int) -> int:
     """Decode the first messages of a bag with mcap-ros2-support, and return how many there were."""
-    from mcap_ros2.reader import read_ros2_messages
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
 
-    return sum(1 for _ in islice(read_ros2_messages(str(source)), count))
+    with source.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        return sum(1 for _ in islice(reader.iter_decoded_messages(), count))
 
 
 def copy_rows(source: Path, destination: Path) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from benchmarks import bag_maker
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -27,6 +30,15 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bag that the documents read, which stands in the current folder there."""
+    path = tmp_path_factory.mktemp("recorded") / "recording"
+    streams = [bag_maker.IMU, bag_maker.JOINT_STATES, bag_maker.SMALL_IMAGE]
+    bag_maker.write_folder(path, bag_maker.record(streams, 2), storage="mcap")
+    return path
+
+
 def run(folder: Path, installed: Path, kind: str, text: str) -> None:
     text = re.sub(r"^pip install \./generated$", "", text, flags=re.MULTILINE)
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
@@ -40,11 +52,12 @@ def run(folder: Path, installed: Path, kind: str, text: str) -> None:
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
-def test_blocks_run(document: Path, installed: Path, tmp_path: Path) -> None:
+def test_blocks_run(document: Path, installed: Path, recording: Path, tmp_path: Path) -> None:
     if document.name == ONE_PROGRAM:
         pytest.skip("run by tests/ros/test_programs.py")
     if document.name in BUILDS:
         pytest.skip("run by tests/hooks")
+    shutil.copytree(recording, tmp_path / "recording")
     for kind, text in BLOCK.findall(document.read_text(encoding="utf-8")):
         if NEEDS_ROS.search(text):
             pytest.importorskip("rclpy", reason="needs a ROS installation")

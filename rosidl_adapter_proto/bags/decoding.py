@@ -32,34 +32,34 @@ def decoder(topic: Topic, types: BagTypes, fields: Sequence[str] | None = None) 
         SchemaError: The type has no such field.
     """
     if topic.serialization_format == PROTOBUF and fields is None:
-        return _parser(types.message_class(topic), topic.type_name)
-    makers = {CDR: _from_cdr, PROTOBUF: _fields_from_protobuf, ROS1: _from_ros1}
-    if topic.serialization_format not in makers:
+        return _parser(types.message_class(topic))
+    decoders = {CDR: _from_cdr, PROTOBUF: _fields_from_protobuf, ROS1: _from_ros1}
+    if topic.serialization_format not in decoders:
         raise BagError(
             f"topic {topic.name}: its messages are {topic.serialization_format}, which cannot be read as messages; "
-            f"{', '.join(makers)} can"
+            f"{', '.join(decoders)} can"
         )
-    return makers[topic.serialization_format](types.schema(topic), fields)
+    return decoders[topic.serialization_format](types.schema(topic), fields)
 
 
-def _parser(message_class: MessageClass, type_name: str) -> Decode:
+def _parser(message_class: MessageClass) -> Decode:
     def parse(data: bytes) -> Message:
         try:
             return message_class.FromString(data)
         except DecodeError:
-            full_name = message_class.DESCRIPTOR.full_name
-            raise TranscodeError(
-                type_name, "", 0, f"these are no bytes of a protobuf message {full_name}"
-            ) from None
+            name = message_class.DESCRIPTOR.full_name
+            raise TranscodeError(name, "", 0, "these are no bytes of this protobuf message") from None
 
     return parse
 
 
 def _from_cdr(schema: Schema, fields: Sequence[str] | None) -> Decode:
-    codec: Codec[Any] = Codec(schema.type_description, schema.message_class)
     if fields is None:
+        codec: Codec[Any] = Codec(schema.type_description, schema.message_class)
         return codec.from_cdr
-    return lambda data: codec.from_cdr(data, fields)
+    transcoder = Transcoder(schema.type_description, schema.descriptor, fields=fields)
+    parse = _parser(schema.message_class)
+    return lambda data: parse(transcoder.cdr_to_proto(data))
 
 
 def _fields_from_protobuf(schema: Schema, fields: Sequence[str] | None) -> Decode:
@@ -70,5 +70,5 @@ def _fields_from_protobuf(schema: Schema, fields: Sequence[str] | None) -> Decod
 
 def _from_ros1(schema: Schema, fields: Sequence[str] | None) -> Decode:
     transcoder = Transcoder(schema.type_description, schema.descriptor, fields=fields)
-    parse = _parser(schema.message_class, schema.type_name)
+    parse = _parser(schema.message_class)
     return lambda data: parse(transcoder.ros1_to_proto(data))

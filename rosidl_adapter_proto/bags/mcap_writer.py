@@ -242,7 +242,7 @@ class McapWriter:
             self._write(channel)
             self._summary[Opcode.CHANNEL] += channel
             self._statistics.channel_count += 1
-            if topic.ros_definition.data and topic.type_name not in self._defined_types:
+            if topic.ros_definition.encoding and topic.type_name not in self._defined_types:
                 definitions[topic.type_name] = write_ros_definition(topic.ros_definition)
         if definitions:
             self.add_metadata(ROS_DEFINITIONS, definitions)
