@@ -1,7 +1,7 @@
 """Where bags are: paths on this machine, and URLs of what fsspec knows, such as `s3://bucket/drive-12`.
 
-A `RemotePath` does what `pathlib.Path` does for a path, as far as bags need it; so code that has a `Place` need not know
-which of the two it is. Paths never import fsspec.
+A `RemotePath` does what `pathlib.Path` does for a path, as far as bags need it; so code that has a `Place` need not
+know which of the two it is. Paths never import fsspec.
 """
 
 from __future__ import annotations
@@ -89,16 +89,18 @@ class RemotePath:
         """Return the size of the file in bytes."""
         size = self._ask("size")
         if size is None:
-            raise BagError(f"{self}: its size is not known, so it cannot be read from its end; download it first")
+            raise BagError(
+                f"{self}: its size is not known, so it cannot be read from its end; download it first"
+            )
         return int(size)
 
     def read_bytes(self) -> bytes:
         """Return what is in the file."""
         return bytes(self._ask("cat_file"))
 
-    def write_text(self, text: str, encoding: str) -> None:
+    def write_bytes(self, data: bytes) -> None:
         """Write the file."""
-        self._ask("pipe_file", text.encode(encoding))
+        self._ask("pipe_file", data)
 
     def open(self, mode: str) -> BinaryIO:
         """Open the file, to read its bytes (`rb`) or to write them (`wb`)."""
@@ -130,7 +132,9 @@ class RemotePath:
         """Return what fits the path, which is a pattern, in order."""
         with _told(self):
             file_system, path = self._file_system()
-            return [RemotePath(file_system.unstrip_protocol(found)) for found in sorted(file_system.glob(path))]
+            return [
+                RemotePath(file_system.unstrip_protocol(found)) for found in sorted(file_system.glob(path))
+            ]
 
     def _ask(self, method: str, *arguments: Any, **options: Any) -> Any:
         """Call a method of the file system with the path."""
