@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from rosidl_adapter_proto.bags.convert_file import FileResult, FileTask
-from rosidl_adapter_proto.bags.places import file_size, find_place
+from rosidl_adapter_proto.bags.places import Place, file_size, find_place
 from rosidl_adapter_proto.bags.workers import RETRIES, Report, Trouble, Workers, attempt
 from rosidl_adapter_proto.errors import PlaceError, RequestError
 
@@ -73,7 +75,7 @@ class _Tasks:
     def convert(self, task: FileTask, report: Report) -> FileResult:
         """Convert a file as a task, and wait for it."""
         source = task.recording.files[task.index].path
-        reference = self._convert.remote(task)
+        reference = self._convert.remote(_with_absolute_paths(task))
         self._running.add(reference)
         try:
             outcome: FileResult | Trouble = self._ray.get(reference)
@@ -99,6 +101,21 @@ class _Tasks:
 
 def _convert_remotely(task: FileTask) -> FileResult | Trouble:
     return attempt(task, lambda size, messages: None)
+
+
+def _with_absolute_paths(task: FileTask) -> FileTask:
+    """Return the task for a process whose current folder is another one."""
+    files = [replace(file, path=_absolute(find_place(file.path))) for file in task.recording.files]
+    return replace(
+        task,
+        recording=replace(task.recording, files=tuple(files)),
+        destination=find_place(_absolute(task.destination)),
+        settings=replace(task.settings, include=tuple(map(Path.absolute, task.settings.include))),
+    )
+
+
+def _absolute(place: Place) -> str:
+    return str(place.absolute() if isinstance(place, Path) else place)
 
 
 def _last_line(error: Exception) -> str:

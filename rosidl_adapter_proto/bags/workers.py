@@ -169,7 +169,7 @@ def processes(count: int, *, retries: int = RETRIES) -> Iterator[Workers]:
     """
     pool = _Processes()
     threads = max((os.cpu_count() or 1) // count, 1)
-    workers = Workers(count, pool.convert, threads=threads, retries=retries, stop=pool.close)
+    workers = Workers(count, pool.convert, threads=threads, retries=retries, stop=pool.stop)
     try:
         yield workers
     finally:
@@ -197,8 +197,14 @@ class _Processes:
             raise outcome.error()
         return outcome
 
+    def stop(self) -> None:
+        """End all processes, whatever they do."""
+        for process in self._all:
+            process.stop()
+
     def close(self) -> None:
-        """End all processes."""
+        """End all processes, and wait for that."""
+        self.stop()
         for process in self._all:
             process.close()
 
@@ -226,9 +232,14 @@ class _Process:
             self._process.join()
             raise PlaceError(f"{_name(task)}: {self._ending()} while it was converted") from None
 
-    def close(self) -> None:
+    def stop(self) -> None:
         """End the process."""
         self._process.terminate()
+
+    def close(self) -> None:
+        """Wait until it has ended."""
+        self._process.join()
+        self._connection.close()
 
     def _ending(self) -> str:
         code = self._process.exitcode or 0

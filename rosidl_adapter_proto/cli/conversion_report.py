@@ -91,7 +91,8 @@ def show_outcomes(outcomes: Sequence[BagOutcome], seconds: float) -> None:
     texts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
     click.echo(f"{len(outcomes)} bags: {texts}; in {time_text(seconds)} ({size_text(size / seconds)}/s)")
     for outcome in failed:
-        click.echo(f"Failed: {outcome.source}: {outcome.error}", err=True)
+        where = "" if outcome.source in outcome.error else f"{outcome.source}: "
+        click.echo(f"Failed: {where}{outcome.error}", err=True)
 
 
 def _show_failures(result: ConversionResult) -> None:

@@ -170,7 +170,11 @@ def test_compression(given: CompressionType, asked: str | None, found: set[str])
 def test_a_split_bag() -> None:
     folder = Path("in")
     folder.mkdir()
-    files = {"b_3.mcap": strings("/a", 4), "a_4.mcap": [*strings("/a", 2, 4), *strings("/b", 3)], "c.mcap": []}
+    files = {
+        "b_3.mcap": strings("/a", 4),
+        "a_4.mcap": [*strings("/a", 2, 4), *strings("/b", 3)],
+        "c.mcap": [],
+    }
     for name, messages in files.items():
         (folder / name).write_bytes(mcap_bytes(messages, {"/a": STRING}))
     (folder / "metadata.yaml").write_text(METADATA)
@@ -299,7 +303,9 @@ def test_a_file_without_chunks_and_one_without_a_summary() -> None:
     assert convert_bag(source, "out.mcap").total == Counts(converted=len(MIXED))
 
     whole = mcap_bytes(MIXED)
-    source = bag(whole[: whole.rindex(b"\x0f\x04\0\0\0\0\0\0\0")], "unfinished.mcap")  # before the record DataEnd
+    source = bag(
+        whole[: whole.rindex(b"\x0f\x04\0\0\0\0\0\0\0")], "unfinished.mcap"
+    )  # before the record DataEnd
     result = convert_bag(source, "unfinished_out.mcap")
     assert result.total == Counts(converted=len(MIXED))
     assert any("not finished" in each for each in result.warnings), result.warnings
