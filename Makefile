@@ -118,6 +118,7 @@ benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/generate.py
 	$(BIN)/python benchmarks/messages.py
 	$(BIN)/python benchmarks/bags.py
+	$(BIN)/python benchmarks/tables.py
 
 golden: $(VENV)/ready
 	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py \

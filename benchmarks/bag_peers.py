@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from bag_maker import typestore
-from messages import copy_header, copy_imu, copy_vector
+from messages import assign_to_protobuf, copy_header, copy_imu, copy_vector
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK = 0x06
@@ -144,15 +144,11 @@ def descriptor_set(descriptor: Any) -> bytes:
 # Adapters as a user would write them: attribute by attribute.
 
 
-def extend(target: Any, name: str, values: Any) -> None:
-    getattr(target, name).extend(values.tolist())
-
-
 def copy_joint_state(source: Any, target: Any) -> Any:
     copy_header(source, target)
     target.name.extend(source.name)
     for name in ("position", "velocity", "effort"):
-        extend(target, name, getattr(source, name))
+        assign_to_protobuf(target, name, getattr(source, name))
     return target
 
 
@@ -167,7 +163,7 @@ def copy_tf(source: Any, target: Any) -> Any:
 
 
 COPIES: dict[str, Callable[[Any, Any], Any]] = {
-    "sensor_msgs/msg/Imu": lambda source, target: copy_imu(source, target, extend),
+    "sensor_msgs/msg/Imu": lambda source, target: copy_imu(source, target, assign_to_protobuf),
     "sensor_msgs/msg/JointState": copy_joint_state,
     "tf2_msgs/msg/TFMessage": copy_tf,
 }

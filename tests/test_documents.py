@@ -61,6 +61,8 @@ def test_blocks_run(document: Path, installed: Path, recording: Path, tmp_path: 
     for kind, text in BLOCK.findall(document.read_text(encoding="utf-8")):
         if NEEDS_ROS.search(text):
             pytest.importorskip("rclpy", reason="needs a ROS installation")
+        if "import polars" in text:
+            pytest.importorskip("polars", reason="needs polars, of the tests beside peers")
         run(tmp_path, installed, kind, text)
 
 

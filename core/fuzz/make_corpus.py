@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "core" / "samples")]
 
-from reference_cdr import write_cdr  # noqa: E402
+from reference_cdr import write_cdr, write_ros1  # noqa: E402
 from ros_types import describe, nasty_types, protobuf_class, protobuf_message, random_value  # noqa: E402
 
 from rosidl_adapter_proto.transcode.plan import build_plan  # noqa: E402
@@ -36,6 +36,19 @@ def sized(content: bytes) -> bytes:
     return struct.pack("<I", len(content)) + content
 
 
+CHANNEL = b"\4" + struct.pack("<Q", 5) + b"other"
+"""A record that is no message."""
+
+
+def chunk(number: int, *messages: bytes) -> bytes:
+    """Make a chunk of a message for each way in which `target.cpp` treats those of a plan."""
+    result = CHANNEL
+    for way, data in enumerate(messages):
+        numbers = struct.pack("<HIQQ", 4 * number + way, way, 1000 - way, 7)
+        result += b"\5" + struct.pack("<Q", len(numbers) + len(data)) + numbers + data
+    return result
+
+
 def main(directory: Path) -> None:
     types = nasty_types()
     inputs = directory / "inputs"
@@ -52,13 +65,17 @@ def main(directory: Path) -> None:
                 value = random_value(types, name, rng)
                 cdr = write_cdr(types, name, value, big_endian=i % 2 == 1)
                 proto = protobuf_message(types, name, value, message_class()).SerializeToString()
+                ros1 = write_ros1(types, name, value)
                 contents = {
                     "cdr": bytes((0, number)) + cdr,
                     "proto": bytes((1, number)) + proto,
                     "groups": bytes((1, number)) + GROUP + proto + GROUP,
+                    "ros1": bytes((4, number)) + ros1,
                     "plan_cdr": b"\2" + sized(plan) + cdr,
                     "plan_proto": b"\3" + sized(plan) + proto,
                 }
+                if i == 0:
+                    contents["chunk"] = b"\5" + chunk(number, cdr, cdr, proto, ros1)
                 for kind, content in contents.items():
                     (inputs / f"{number}_{kind}_{i}").write_bytes(content)
     (directory / "plans.bin").write_bytes(b"".join(map(sized, plans)))

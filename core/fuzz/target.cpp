@@ -1,9 +1,11 @@
-// The fuzz target: both directions, and plans themselves.
+// The fuzz target: all directions, plans themselves, and chunks of messages.
 //
 // The first byte of an input says what to do with the rest:
 //   0  the number of a plan, and then a CDR message; 1  the same with a protobuf message
 //   2  a packed plan, its size before it as uint32, and then a CDR message; 3  the same with a protobuf
 //   message
+//   4  the number of a plan, and then a message of ROS 1
+//   5  a chunk, in which each topic id is the number of a plan and a way to treat its messages
 // The plans with numbers are in the file that the environment variable ROSIDL_PROTO_FUZZ_PLANS names, each
 // with its size before it. make_corpus.py writes that file and inputs to begin with.
 #include <cstdio>
@@ -11,6 +13,8 @@
 #include <memory>
 #include <vector>
 
+#include "columns.hpp"
+#include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
@@ -67,6 +71,19 @@ std::unique_ptr<Heap> to_cdr(const Plan& plan, Input proto) {
   if (!write_proto_to_cdr(plan, proto, fields, {cdr->data.get(), size}, error))
     return check_error(plan, error, proto.size), nullptr;
   return cdr;
+}
+
+std::unique_ptr<Heap> ros1_to_proto(const Plan& plan, Input ros1) {
+  Error error;
+  Lengths lengths;
+  uint64_t size = 0;
+  if (!measure_ros1_to_proto(plan, ros1, kLimit, lengths, &size, error))
+    return check_error(plan, error, ros1.size), nullptr;
+  check(size <= kLimit, "a result passes the limit");
+  auto proto = std::make_unique<Heap>(size);
+  check(write_ros1_to_proto(plan, ros1, lengths, 0, {proto->data.get(), size}, error),
+        "measured ROS 1 cannot be written");
+  return proto;
 }
 
 Input input_of(const std::unique_ptr<Heap>& heap) { return {heap->data.get(), heap->size}; }
@@ -153,11 +170,128 @@ std::vector<Plan> read_plans() {
 void run(const Plan& plan, bool is_cdr, Input message) {
   round_trip(plan, is_cdr, message);
   is_cdr ? change(plan, message) : change_proto(plan, message);
+  fuzz_columns(plan, message, check);
   const uint64_t number = 1;
   Slice slice;
   const uint8_t* const end = message.data + message.size;
   if (find_packed_fields(message.data, end, &number, 1, &slice))
     check(slice.size <= message.size, "a field is larger than its message");
+}
+
+void run_ros1(const Plan& plan, Input ros1) {
+  const auto proto = ros1_to_proto(plan, ros1);
+  if (!proto || plan.partial()) return;
+  const auto cdr = to_cdr(plan, input_of(proto));
+  if (cdr) check(equal(proto, to_proto(plan, input_of(cdr))), "ROS 1 and CDR do not agree");
+}
+
+// Chunks
+// ----------------------------------------------------------------------------------------------------------
+
+constexpr Treatment kTreatments[] = {Treatment::Copy, Treatment::CdrToProto, Treatment::ProtoToCdr,
+                                     Treatment::Ros1ToProto};
+constexpr size_t kWays = sizeof kTreatments / sizeof *kTreatments;
+constexpr uint16_t kFailedTopic = 0xffff;
+
+// What becomes of a topic: its id is `4 * plan + way`, and those from 0x8000 on are left out.
+std::unique_ptr<RecordConverter> make_converter(const std::vector<Plan>& plans) {
+  auto converter = std::make_unique<RecordConverter>();
+  for (size_t i = 0; i < plans.size() * kWays; ++i) {
+    const auto id = static_cast<uint16_t>(i);
+    converter->add(id, {kTreatments[i % kWays], id, &plans[i / kWays], kLimit, i % 3 == 0, kFailedTopic});
+  }
+  for (uint32_t id = 0x8000; id < kFailedTopic; ++id)
+    converter->add(static_cast<uint16_t>(id), {Treatment::LeaveOut});
+  return converter;
+}
+
+void check_records_error(const RecordsError& error, Input chunk) {
+  check(error.reason != RecordsReason::None && error.offset <= chunk.size, "an error of a chunk is nowhere");
+  check(!reason(error).empty(), "a reason has no text");
+}
+
+std::vector<MessageRecord> messages_of(Input chunk) {
+  std::vector<MessageRecord> messages;
+  RecordsError error;
+  const auto add = [&](const MessageRecord& each) { return messages.push_back(each), true; };
+  if (!walk_records(chunk, error, add, [](const Record&) { return true; })) messages.clear();
+  return messages;
+}
+
+void check_index(Input chunk, const std::vector<MessageRecord>& messages) {
+  RecordIndex index;
+  RecordsError error;
+  if (!index_records(chunk, index, error)) return check_records_error(error, chunk);
+  uint64_t count = 0;
+  for (const RecordIndex::Topic& topic : index.topics) {
+    const uint8_t* const record = index.data.data() + topic.place;
+    uint64_t time = 0;
+    for (uint64_t i = 0; i < topic.message_count; ++i) {
+      const uint8_t* const entry = record + kRecordHeader + 6 + 16 * i;
+      const auto offset = load_little<uint64_t>(entry + 8);
+      check(load_little<uint64_t>(entry) >= time, "an index is not sorted");
+      time = load_little<uint64_t>(entry);
+      check(chunk.data[offset] == kMessageOpcode, "an index leads to what is no message");
+      check(load_little<uint64_t>(chunk.data + offset + kRecordHeader + 6) == time,
+            "an index has another time than the message");
+      check(load_little<uint16_t>(chunk.data + offset + kRecordHeader) == topic.id,
+            "an index has another topic than the message");
+    }
+    count += topic.message_count;
+  }
+  check(count == messages.size(), "an index does not have all messages");
+}
+
+std::unique_ptr<Heap> treat(const std::vector<Plan>& plans, const MessageRecord& message) {
+  const Plan& plan = plans[message.topic_id / kWays];
+  switch (kTreatments[message.topic_id % kWays]) {
+    case Treatment::CdrToProto:
+      return to_proto(plan, message.data);
+    case Treatment::ProtoToCdr:
+      return to_cdr(plan, message.data);
+    case Treatment::Ros1ToProto:
+      return ros1_to_proto(plan, message.data);
+    default:
+      break;
+  }
+  auto same = std::make_unique<Heap>(message.data.size);
+  copy(same->data.get(), message.data.data, message.data.size);
+  return same;
+}
+
+// The result is what single messages become.
+void run_chunk(const std::vector<Plan>& plans, Input chunk) {
+  static const std::unique_ptr<RecordConverter> converter = make_converter(plans);
+  const std::vector<MessageRecord> messages = messages_of(chunk);
+  check_index(chunk, messages);
+  ConvertedChunk result;
+  RecordsError error;
+  if (!converter->convert(chunk, {}, result, error)) return check_records_error(error, chunk);
+  const std::vector<MessageRecord> found = messages_of({result.data.data(), result.data.size()});
+  check(found.size() == result.message_count, "a result cannot be read again");
+  size_t place = 0, failed = 0;
+  for (size_t i = 0; i < messages.size(); ++i) {
+    const MessageRecord& message = messages[i];
+    if (message.topic_id >= 0x8000) continue;
+    const auto expected = treat(plans, message);
+    Input content = message.data;
+    if (expected) {
+      content = input_of(expected);
+    } else {
+      check(failed < result.failures.size() && result.failures[failed].index == i, "a failure is not told");
+      ++failed;
+      check_error(plans[message.topic_id / kWays], converter->error(message), message.data.size);
+      if (!converter->route(message.topic_id).copy_failed) continue;
+    }
+    check(place < found.size(), "a message is missing");
+    const MessageRecord& converted = found[place++];
+    check(converted.topic_id == (expected ? message.topic_id : kFailedTopic) &&
+              converted.log_time == message.log_time && converted.publish_time == message.publish_time &&
+              converted.sequence == message.sequence && converted.data.size == content.size &&
+              (content.size == 0 || std::memcmp(converted.data.data, content.data, content.size) == 0),
+          "a message is not what it becomes alone");
+  }
+  check(place == found.size() && failed == result.failures.size(), "there are too many messages");
 }
 
 }  // namespace
@@ -173,6 +307,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Plan plan;
     if (plan_size > size - 5 || plan.load(data + 5, plan_size) != nullptr) return 0;
     run(plan, mode == 2, {data + 5 + plan_size, size - 5 - plan_size});
+  } else if (mode == 4) {
+    run_ros1(plans[data[1] % plans.size()], {data + 2, size - 2});
+  } else if (mode == 5) {
+    run_chunk(plans, {data + 1, size - 1});
   }
   return 0;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "columns.hpp"
 #include "records.hpp"
 #include "transcoder.hpp"
 
@@ -207,5 +208,6 @@ NB_MODULE(_core, module) {
            nb::arg(), nb::arg().none());
   nb::class_<Codec>(module, "Codec", nb::type_slots(codec_slots))
       .def(nb::init<nb::handle_t<Transcoder>, nb::object>(), nb::arg("transcoder"), nb::arg("message_class"));
+  define_columns(module);
   define_records(module);
 }

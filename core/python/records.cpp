@@ -5,6 +5,7 @@
 #include <rosidl_adapter_proto/convert.hpp>
 #include <vector>
 
+#include "memory_pool.hpp"
 #include "transcoder.hpp"
 
 namespace rosidl_proto {
@@ -175,7 +176,7 @@ nb::tuple index(nb::handle data) {
 // Memory as Python reads it: any number of views, none of which can change it.
 int view_memory(PyObject* self, Py_buffer* view, int flags) noexcept {
   static uint8_t nothing;
-  const auto& memory = *nb::inst_ptr<Memory>(self);
+  const Memory& memory = *nb::inst_ptr<Memory>(self);
   void* const data = memory.size() == 0 ? &nothing : const_cast<uint8_t*>(memory.data());
   return PyBuffer_FillInfo(view, self, data, static_cast<Py_ssize_t>(memory.size()), 1, flags);
 }
@@ -222,12 +223,14 @@ class Converter {
     const Buffer buffer(data);
     const TimeRange times = times_of(start_time, end_time);
     ConvertedChunk result;
+    result.data = pool_->take();
     RecordsError error;
     bool good;
     {
       nb::gil_scoped_release release;
       good = converter_.convert(buffer.input(), times, result, error);
     }
+    nb::object memory = nb::cast(PooledMemory(std::move(result.data), pool_));
     if (!good) fail(error);
     nb::list failures;
     for (const FailedMessage& failed : result.failures) {
@@ -236,11 +239,12 @@ class Converter {
       failures.append(nb::make_tuple(message.topic_id, message.log_time, message.sequence, failed.index,
                                      transcoder.exception(converter_.error(message), nb::none())));
     }
-    return nb::make_tuple(nb::cast(std::move(result.data)), result.message_count, failures);
+    return nb::make_tuple(memory, result.message_count, failures);
   }
 
  private:
   RecordConverter converter_;
+  std::shared_ptr<MemoryPool> pool_ = std::make_shared<MemoryPool>();
   ByTopic<const Transcoder*> transcoders_;  // of the owners
   nb::list owners_;
 };
@@ -254,6 +258,7 @@ void define_records(nb::module_& module) {
              "Return message records, one after the other, as they stand in a chunk.");
   module.def("index_records", &index, nb::arg());
   nb::class_<Memory>(module, "Memory", nb::type_slots(memory_slots));
+  nb::class_<PooledMemory, Memory>(module, "PooledMemory");
   nb::class_<Converter>(module, "RecordConverter")
       .def(nb::init<nb::list>(), nb::arg("routes"))
       .def("_convert", &Converter::convert, nb::arg(), nb::arg(), nb::arg().none());

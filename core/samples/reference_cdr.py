@@ -1,4 +1,4 @@
-"""A second, slow and simple writer of plain CDR (OMG CORBA 3.3 part 2, section 9.3), to compare with."""
+"""Second, slow and simple writers of plain CDR (OMG CORBA 3.3 part 2, section 9.3) and of ROS 1, to compare with."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import struct
 from typing import Any
 
 from ros_types import NUMBER_FORMATS, Types, Value, element_name, shape
+
+FILLER = "structure_needs_at_least_one_member"
 
 
 class CdrWriter:
@@ -56,6 +58,25 @@ class CdrWriter:
 
     def bytes(self) -> bytes:
         return self.header + bytes(self.body)
+
+
+class Ros1Writer(CdrWriter):
+    """Writes values as ROS 1 does; wide strings, which it does not have, as in CDR."""
+
+    def number(self, form: str, value: Any) -> None:
+        self.body += struct.pack(f"<{form}", value)
+
+    def element(self, field: dict[str, Any], value: Any) -> None:
+        if element_name(field) == "string":
+            self.number("I", len(value.encode()))
+            self.body += value.encode()
+        elif field["name"] != FILLER:
+            super().element(field, value)
+
+
+def write_ros1(types: Types, name: str, value: Value) -> bytes:
+    """Serialize a value for ROS 1."""
+    return bytes(Ros1Writer(types).message(name, value).body)
 
 
 def write_cdr(types: Types, name: str, value: Value, **options: Any) -> bytes:

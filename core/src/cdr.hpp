@@ -14,6 +14,24 @@ namespace {
 
 constexpr uint64_t kCdrHeader = 4;
 
+// The byte order of plain CDR; false and an error for any other encapsulation. The two bytes of options that
+// follow its identifier say nothing about plain CDR.
+inline bool byte_order(Input cdr, bool* swapped, Error& error) {
+  if (cdr.size < kCdrHeader) {
+    error.reason = Reason::Header;
+    error.a = cdr.size;
+    return false;
+  }
+  const unsigned id = unsigned{cdr.data[0]} << 8 | cdr.data[1];
+  if (id > 1) {
+    error.reason = Reason::Encapsulation;
+    error.a = id;
+    return false;
+  }
+  *swapped = id == 0;
+  return true;
+}
+
 // How messages are laid out. ROS 1 has what is CDR without all that CDR adds
 // (https://wiki.ros.org/ROS/Technical%20Overview#Message_serialization_and_msg_MD5_sums).
 struct PlainCdr {

@@ -18,28 +18,6 @@ bool Lengths::grow() {
   return true;
 }
 
-namespace {
-
-// The byte order of plain CDR; false and an error for any other encapsulation. The two bytes of options that
-// follow its identifier say nothing about plain CDR.
-bool byte_order(Input cdr, bool* swapped, Error& error) {
-  if (cdr.size < kCdrHeader) {
-    error.reason = Reason::Header;
-    error.a = cdr.size;
-    return false;
-  }
-  const unsigned id = unsigned{cdr.data[0]} << 8 | cdr.data[1];
-  if (id > 1) {
-    error.reason = Reason::Encapsulation;
-    error.a = id;
-    return false;
-  }
-  *swapped = id == 0;
-  return true;
-}
-
-}  // namespace
-
 bool measure_cdr_to_proto(const Plan& plan, Input cdr, uint64_t limit, Lengths& lengths, uint64_t* size,
                           Error& error) noexcept {
   bool swapped;

@@ -69,7 +69,7 @@ const char* text_of(Reason reason) {
     case Reason::Utf8:
       return "the text is not valid UTF-8; encode it as UTF-8, or use bytes for what is not text";
     case Reason::Utf16:
-      return "half of a surrogate pair stands alone, which text in protobuf cannot hold; send both halves";
+      return "half of a surrogate pair stands alone, which text cannot hold; send both halves";
     case Reason::StringBound:
       return "the string has {a} characters and its bound is {b}; shorten it";
     case Reason::SequenceBound:
@@ -84,6 +84,9 @@ const char* text_of(Reason reason) {
     case Reason::Partial:
       return "only chosen fields are transcoded, and a ROS message needs all of them; use a transcoder "
              "without fields";
+    case Reason::ColumnsFull:
+      return "a column would have more than {a} bytes, or all of them more than twice that; choose fewer "
+             "fields";
     case Reason::Changed:
       return "the data changed while it was read; give a copy that nobody writes to";
   }

@@ -81,20 +81,12 @@ std::string reason(const RecordsError& error) {
              "; give one, or None to leave the messages of this topic out";
     case RecordsReason::TooLarge:
       return "with this message the result would have more than " + a + " bytes; make smaller chunks";
+    case RecordsReason::ChunkTooLarge:
+      return "the chunk has " + a + " bytes and may have " + b + "; make smaller chunks";
     case RecordsReason::OutOfMemory:
       return "there is not enough memory for the result; make smaller chunks";
   }
   return "";
-}
-
-bool Memory::grow(uint64_t more) {
-  const uint64_t capacity = std::max(size_ + more, capacity_ + capacity_ / 2);
-  if (capacity > SIZE_MAX) return false;
-  void* const memory = std::realloc(data_, static_cast<size_t>(capacity));
-  if (memory == nullptr) return false;
-  data_ = static_cast<uint8_t*>(memory);
-  capacity_ = capacity;
-  return true;
 }
 
 bool index_records(Input chunk, RecordIndex& index, RecordsError& error) noexcept {
@@ -112,7 +104,8 @@ bool index_records(Input chunk, RecordIndex& index, RecordsError& error) noexcep
       found.push_back({message.topic_id, {message.log_time, message.offset}});
       return true;
     };
-    if (chunk.size > kMaximumChunk) return error.stop(RecordsReason::TooLarge, kMaximumChunk, kMaximumChunk);
+    if (chunk.size > kMaximumChunk)
+      return error.stop(RecordsReason::ChunkTooLarge, 0, chunk.size, kMaximumChunk);
     if (!walk_records(chunk, error, add, [](const Record&) { return true; })) return false;
     if (!found.empty()) index.start_time = start, index.end_time = end;
     write_index(sort_entries(found, topics), topics, index);

@@ -44,7 +44,29 @@ const uint8_t* next_code_point(const uint8_t* data, const uint8_t* end, uint32_t
   return data;
 }
 
+namespace {
+
+// Looks at 8 bytes at once, of which the last may be looked at twice.
+bool is_ascii(const uint8_t* data, uint64_t size) {
+  constexpr uint64_t kHigh = 0x8080808080808080u;
+  uint64_t bits = 0;
+  if (size >= 8) {
+    const uint8_t* const last = data + size - 8;
+    for (; data < last; data += 8) bits |= load_little<uint64_t>(data);
+    bits |= load_little<uint64_t>(last);
+  } else if (size >= 4) {
+    bits = load_little<uint32_t>(data) | load_little<uint32_t>(data + size - 4);
+  } else {
+    for (uint64_t i = 0; i < size; ++i) bits |= data[i];
+  }
+  return (bits & kHigh) == 0;
+}
+
+}  // namespace
+
 bool is_utf8(const uint8_t* data, uint64_t size) {
+  constexpr uint64_t kShort = 64;  // where most texts end, and most of them are ASCII
+  if (size <= kShort && is_ascii(data, size)) return true;
   const uint8_t* const end = data + size;
   while (data != end) {
     while (end - data >= 8 && (load_little<uint64_t>(data) & 0x8080808080808080u) == 0) data += 8;

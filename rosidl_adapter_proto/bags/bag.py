@@ -17,7 +17,7 @@ from google.protobuf.message import Message
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.decoding import Decode, decoder
 from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
-from rosidl_adapter_proto.bags.order import in_time_order
+from rosidl_adapter_proto.bags.order import Run, in_time_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.bags.types import BagTypes
@@ -259,17 +259,37 @@ class Bag:
         if isinstance(fields, str):
             raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
         names = frozenset(self.topics if topics is None else self._names(topics))
-        start_time = 0 if start is None else max(to_nanoseconds(start, "time"), 0)
-        end_time = None if end is None else max(to_nanoseconds(end, "time"), 0)
         chosen = None if fields is None else tuple(fields)
         if chosen is not None:
             for name in sorted(names):
                 decoder(self.topics[name], self.types, chosen)
-        return self._messages(names, start_time, end_time, chosen)
+        return self._messages(self.runs(names, start=start, end=end), chosen)
 
-    def _messages(
-        self, names: frozenset[str], start_time: int, end_time: int | None, fields: Sequence[str] | None
-    ) -> Iterator[BagMessage]:
+    def runs(
+        self, topics: Iterable[str], *, start: Time | None = None, end: Time | None = None
+    ) -> Iterator[tuple[StorageReader, Run]]:
+        """Return an iterator over the same messages as `messages`, many at a time and as they were recorded.
+
+        Args:
+            topics: The names of topics.
+            start: As for `messages`.
+            end: As for `messages`.
+
+        Returns:
+            For each run of messages, the open file that it is in and the run.
+
+        Raises:
+            BagError: There is no such topic; or, while messages are read, a file is damaged.
+            TypeError: A time is none.
+        """
+        names = frozenset(self._names(topics))
+        start_time = 0 if start is None else max(to_nanoseconds(start, "time"), 0)
+        end_time = None if end is None else max(to_nanoseconds(end, "time"), 0)
+        return self._runs(names, start_time, end_time)
+
+    def _runs(
+        self, names: frozenset[str], start_time: int, end_time: int | None
+    ) -> Iterator[tuple[StorageReader, Run]]:
         for index, file in enumerate(self.files):
             ids = frozenset(topic_id for topic_id, topic in file.topics.items() if topic.name in names)
             after = file.statistics.end_time < start_time
@@ -278,11 +298,10 @@ class Bag:
                 continue
             self._check_open()
             with self.recording.open(index) as reader:
-                yield from self._file_messages(reader, Selection(ids, start_time, end_time), fields)
+                for run in self._file_runs(reader, Selection(ids, start_time, end_time)):
+                    yield reader, run
 
-    def _file_messages(
-        self, reader: StorageReader, selection: Selection, fields: Sequence[str] | None
-    ) -> Iterator[BagMessage]:
+    def _file_runs(self, reader: StorageReader, selection: Selection) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:
             self._check_open()
             try:
@@ -292,13 +311,20 @@ class Bag:
             except RecordsError as error:
                 raise BagError(f"{chunk.where}: {error}") from error
 
-        assert selection.topic_ids is not None  # all topics are named
-        sources = {topic_id: self._source(reader, topic_id, fields) for topic_id in selection.topic_ids}
-        for run in in_time_order(reader.chunks(selection, in_time_order=True), read):
+        return in_time_order(reader.chunks(selection, in_time_order=True), read)
+
+    def _messages(
+        self, runs: Iterator[tuple[StorageReader, Run]], fields: Sequence[str] | None
+    ) -> Iterator[BagMessage]:
+        sources: dict[tuple[str, int], _Source] = {}
+        for reader, run in runs:
             records = run.records
             data, ranges = records.data, records.ranges
             for i in run.indexes:
-                source = sources[records.topic_ids[i]]
+                key = reader.path, records.topic_ids[i]
+                if key not in sources:
+                    sources[key] = self._source(reader, key[1], fields)
+                source = sources[key]
                 yield BagMessage(
                     source.topic.name,
                     records.log_times[i],

@@ -54,14 +54,13 @@ def chunk_converter(
     for topic_id, route in routes.items():
         if route.result is None:
             native[topic_id] = None
-        elif route.schema is None:
+        elif route.result_schema is None:
             native[topic_id] = Route(topic_id)
         else:
-            if route.schema not in transcoders:
-                transcoders[route.schema] = Transcoder(route.schema.type_description, route.schema.descriptor)
-            native[topic_id] = Route(
-                topic_id, transcoders[route.schema], directions[0], failed_ids.get(topic_id)
-            )
+            schema = route.result_schema
+            if schema not in transcoders:
+                transcoders[schema] = Transcoder(schema.type_description, schema.descriptor)
+            native[topic_id] = Route(topic_id, transcoders[schema], directions[0], failed_ids.get(topic_id))
     return RecordConverter(native)
 
 

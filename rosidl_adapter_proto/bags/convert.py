@@ -41,7 +41,7 @@ def convert_bag(
     compression: str | None = None,
     topics: Iterable[str] = (),
     excluded_topics: Iterable[str] = (),
-    start: Time = 0,
+    start: Time | None = None,
     end: Time | None = None,
     on_error: str = "stop",
     include: Iterable[Path | str] = (),
@@ -66,7 +66,8 @@ def convert_bag(
         compression: How chunks are compressed, `none`, `zstd` or `lz4`; by default as in the source.
         topics: Which topics to convert: names, or patterns with `*`, `?` and `[...]`; by default all.
         excluded_topics: Which topics to leave out, likewise.
-        start: When the first message to convert was recorded: a `datetime`, nanoseconds since 1970, or another time.
+        start: When the first message to convert was recorded: a `datetime`, nanoseconds since 1970, or another time;
+            by default there is no start.
         end: When the first message not to convert any more was recorded; by default there is no end.
         on_error: What becomes of messages that cannot be converted: `stop`, `skip` or `copy` (`OnError`).
         include: Folders with definitions that the bag does not have.
@@ -108,7 +109,7 @@ def settings_of(
     *,
     topics: Iterable[str] = (),
     excluded_topics: Iterable[str] = (),
-    start: Time = 0,
+    start: Time | None = None,
     end: Time | None = None,
     on_error: str = "stop",
     include: Iterable[Path | str] = (),
@@ -118,7 +119,7 @@ def settings_of(
     return Settings(
         topics=tuple(topics),
         excluded_topics=tuple(excluded_topics),
-        start_time=to_nanoseconds(start),
+        start_time=0 if start is None else to_nanoseconds(start),
         end_time=None if end is None else to_nanoseconds(end),
         on_error=OnError(on_error),
         include=tuple(map(Path, include)),

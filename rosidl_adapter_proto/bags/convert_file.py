@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -90,7 +90,11 @@ def convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileRe
 def _convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileResult:
     salvage = task.settings.on_error is not OnError.STOP
     with task.recording.open(task.index, salvage) as reader, _open_writer(task, reader) as writer:
-        return _FileConversion(task, reader, writer).run(progress)
+        wrong_labels = label_warnings(reader, selected_topics(reader.topics, task.settings))
+        try:
+            return _FileConversion(task, reader, writer, wrong_labels).run(progress)
+        except BagError as error:
+            raise BagError("; ".join([str(error), *wrong_labels])) from error
 
 
 def _open_writer(task: FileTask, reader: StorageReader) -> StorageWriter:
@@ -120,7 +124,9 @@ def _compression(task: FileTask, reader: StorageReader) -> str:
 class _FileConversion:
     """The conversion of one open file."""
 
-    def __init__(self, task: FileTask, reader: StorageReader, writer: StorageWriter) -> None:
+    def __init__(
+        self, task: FileTask, reader: StorageReader, writer: StorageWriter, warnings: Sequence[str]
+    ) -> None:
         settings = task.settings
         self._task = task
         self._reader = reader
@@ -134,15 +140,17 @@ class _FileConversion:
         self._failed_ids = self._reserve_failed_ids()
         self._ledger = Ledger(reader.path, self._routes, reader.statistics.message_counts, settings)
         self._topics: dict[int, Topic] = {}
+        self._warnings = list(warnings)
 
     def run(self, progress: Callable[[int, int], None]) -> FileResult:
         """Convert everything."""
-        warnings = label_warnings(self._reader, self._selected())
         if self._writer.storage == SQLITE3 != self._reader.storage:
-            warnings.append("sqlite3 has no room for publish times and sequence numbers: they are left out")
+            self._warnings.append(
+                "sqlite3 has no room for publish times and sequence numbers: they are left out"
+            )
         for topic_id, route in self._routes.items():
             if route.reason:
-                warnings.append(f"{route.reason}; its messages are {route.fate.value}")
+                self._warnings.append(f"{route.reason}; its messages are {route.fate.value}")
             if route.result is not None:
                 self._add_topic(route.result, topic_id)
         self._convert_chunks(progress)
@@ -150,7 +158,7 @@ class _FileConversion:
         self._copy_the_rest()
         statistics = self._writer.statistics
         self._writer.finish()
-        warnings = [*self._reader.warnings, *self._types.warnings, *warnings, *self._ledger.warnings]
+        warnings = [*self._reader.warnings, *self._types.warnings, *self._warnings, *self._ledger.warnings]
         result = ConversionResult(
             counts, self._ledger.failures, self._ledger.failed_count, tuple(dict.fromkeys(warnings))
         )
@@ -203,7 +211,7 @@ class _FileConversion:
             self._write(chunk)
             progress(memoryview(chunk.source.data).nbytes, chunk.packed.message_count if chunk.packed else 0)
         if self._damage:
-            self._ledger.add_damage(self._damage, self._writer.statistics.message_counts)
+            self._ledger.add_damage(self._damage)
 
     def _chunks(self) -> Iterator[StoredChunk]:
         """Yield the chunks to convert; of a damaged file those before the damage, which are then done first."""
@@ -218,7 +226,11 @@ class _FileConversion:
     def _write(self, chunk: ConvertedChunk) -> None:
         """Write a chunk, and note what could not be converted."""
         if chunk.damage:
-            self._ledger.add_damage(chunk.damage, self._writer.statistics.message_counts)
+            count = self._writer.statistics.message_count
+            self._ledger.add_damage(
+                chunk.damage,
+                f"; {count} messages before that are whole, and `--on-error skip` converts all that can be read",
+            )
         if chunk.failures:
             self._ledger.add_failures(chunk.failures, self._writer.statistics.message_counts)
         for topic_id in {each.failure.topic_id for each in chunk.failures} & self._failed_ids.keys():

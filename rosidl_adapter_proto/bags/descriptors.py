@@ -50,7 +50,7 @@ def recorded_class(data: bytes, full_name: str) -> MessageClass:
     return kept_class(descriptor)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _pool(data: bytes) -> DescriptorPool:
     """Return a pool that has the files of a set."""
     if len(data) > MAXIMUM_SIZE:

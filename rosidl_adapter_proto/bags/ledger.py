@@ -16,7 +16,6 @@ class Ledger:
 
     Attributes:
         failures: The first messages that could not be converted.
-        damage: What is wrong with the file itself.
         warnings: What the user should know.
 
     Args:
@@ -30,7 +29,6 @@ class Ledger:
         self, path: str, routes: Mapping[int, TopicRoute], said: Mapping[int, int], settings: Settings
     ) -> None:
         self.failures: list[FailedMessage] = []
-        self.damage: list[BagError] = []
         self.warnings: list[str] = []
         self._path = path
         self._routes = routes
@@ -41,8 +39,9 @@ class Ledger:
 
     @property
     def failed_count(self) -> int:
-        """How many messages could not be converted."""
-        return self._failed.total()
+        """How many messages could not be converted: single ones, and those of topics of which no type is known."""
+        unknown = [topic_id for topic_id, route in self._routes.items() if route.reason]
+        return self._failed.total() + sum(self._said.get(topic_id, 0) for topic_id in unknown)
 
     def add_failures(self, failures: Sequence[FailureInChunk], written: Mapping[int, int]) -> None:
         """Note the messages of a chunk that could not be converted.
@@ -73,22 +72,18 @@ class Ledger:
                     f"{self.failures[0]}; `--on-error skip` leaves such messages out, and `--on-error copy` copies them"
                 )
 
-    def add_damage(self, damage: BagError, written: Mapping[int, int]) -> None:
+    def add_damage(self, damage: BagError, advice: str = "") -> None:
         """Note that the file is damaged.
 
         Args:
             damage: What is wrong, and where.
-            written: How many messages of each topic came before that.
+            advice: What else to say if the conversion is to stop there.
 
         Raises:
             BagError: The conversion is to stop there.
         """
         if self._on_error is OnError.STOP:
-            raise BagError(
-                f"{damage}; the {sum(written.values())} messages before that can be read: "
-                "`--on-error skip` converts whatever can be read"
-            )
-        self.damage.append(damage)
+            raise BagError(f"{damage}{advice}")
         self.warnings.append(str(damage))
 
     def counts(self, written: Mapping[int, int]) -> dict[str, Counts]:

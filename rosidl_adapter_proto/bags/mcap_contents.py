@@ -15,6 +15,7 @@ from mcap.opcode import Opcode
 from rosidl_adapter_proto.bags.compression import COMPRESSIONS, records_of
 from rosidl_adapter_proto.bags.mcap_records import (
     FOOTER_SIZE,
+    KNOWN_OPCODES,
     MAGIC,
     PIECE_SIZE,
     RECORD_HEAD,
@@ -35,9 +36,14 @@ if TYPE_CHECKING:
 Damaged = Callable[[BagError], None]
 """What is called with each damage that is found: it raises it, or notes it, and then what can be read is read."""
 
-# Where a message or a chunk may begin, with a length below 2^48: how reading goes on behind what is no record.
-_CANDIDATE = re.compile(rb"[\x05\x06].{6}\x00\x00", re.DOTALL)
+DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+
+# Where a schema, channel, message or chunk may begin, with a length below 2^48: how reading goes on behind what is no
+# record. The first three are also what an uncompressed chunk that was cut off has inside.
+_CANDIDATE = re.compile(rb"[\x03-\x06].{6}\x00\x00", re.DOTALL)
 _BELIEVABLE_RECORDS = 3
+# What ends the data: a damaged opcode must not end it sooner.
+_END_SIZES: dict[int, int] = {Opcode.DATA_END: 4, Opcode.FOOTER: 20}
 
 
 @dataclass
@@ -64,18 +70,20 @@ class Contents:
 
 
 def find_end(file: McapFile) -> int | None:
-    """Return the place behind the recording, which is the end of the file unless there is garbage behind it.
+    """Return the place behind the recording, looked for from the front: garbage may follow.
 
     Returns:
-        None if the recording was not finished, or is damaged.
+        None if the recording was not finished, or something is wrong on the way.
     """
-    if read_footer(file) is not None:
-        return file.size
+
+    def stop(error: BagError) -> None:
+        raise error
+
     try:
-        for place in file.places(len(MAGIC), file.size):
-            end = place.end + len(MAGIC)
-            if place.opcode == Opcode.FOOTER and end <= file.size and file.read(place.end, end) == MAGIC:
-                return end
+        for found in walk(file, stop):
+            if isinstance(found, Place) and found.opcode == Opcode.FOOTER:
+                end = found.end + len(MAGIC)
+                return end if end <= file.size and file.read(found.end, end) == MAGIC else None
     except BagError:
         return None
     return None
@@ -91,14 +99,13 @@ def read_footer(file: McapFile) -> records.Footer | None:
     return file.record(records.Footer, file.place(start, file.size))
 
 
-def read_summary(file: McapFile) -> Contents | None:
+def read_summary(file: McapFile, footer: records.Footer) -> Contents | None:
     """Return what the summary says; None if it leaves out some of it, as it may.
 
     Raises:
         BagError: The summary is damaged, or points to what is not there.
     """
-    footer = read_footer(file)
-    if footer is None or not footer.summary_start:
+    if not footer.summary_start:
         return None
     end = file.size - FOOTER_SIZE - len(MAGIC)
     if not len(MAGIC) <= footer.summary_start <= end:
@@ -114,25 +121,30 @@ def read_summary(file: McapFile) -> Contents | None:
             )
     contents = Contents()
     statistics = None
+    # By place: what two indexes point to is there once.
+    metadata: dict[int, Place] = {}
+    attachments: dict[int, Place] = {}
     known_topics: dict[frozenset[int], frozenset[int]] = {}
     for place in file.places(footer.summary_start, end):
-        if place.opcode == Opcode.SCHEMA:
-            add_schema(contents, file.record(records.Schema, place), file.where(place.start))
-        elif place.opcode == Opcode.CHANNEL:
-            add_channel(contents, file.record(records.Channel, place), file.where(place.start))
+        if place.opcode in DEFINITIONS:
+            add_definition(
+                contents, place.opcode, file.read(place.content, place.end), file.where(place.start)
+            )
         elif place.opcode == Opcode.STATISTICS:
             statistics = file.record(records.Statistics, place)
         elif place.opcode == Opcode.METADATA_INDEX:
-            indexed = _indexed(file, file.record(records.MetadataIndex, place).offset, Opcode.METADATA, place)
-            contents.metadata.append(file.record(records.Metadata, indexed))
+            offset = file.record(records.MetadataIndex, place).offset
+            metadata[offset] = _indexed(file, offset, Opcode.METADATA, place)
         elif place.opcode == Opcode.ATTACHMENT_INDEX:
             offset = file.record(records.AttachmentIndex, place).offset
-            contents.attachments.append(_indexed(file, offset, Opcode.ATTACHMENT, place))
+            attachments[offset] = _indexed(file, offset, Opcode.ATTACHMENT, place)
         elif place.opcode == Opcode.CHUNK_INDEX:
             index = file.record(records.ChunkIndex, place)
             topics = frozenset(index.message_index_offsets)
             if topics:
                 contents.chunk_topics[index.chunk_start_offset] = known_topics.setdefault(topics, topics)
+    contents.metadata = [file.record(records.Metadata, place) for place in metadata.values()]
+    contents.attachments = list(attachments.values())
     if statistics is None or not _complete(contents, statistics):
         return None
     contents.statistics = Statistics(
@@ -152,7 +164,7 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
     contents = Contents()
     counts: Counter[int] = Counter()
     times: list[int] = []
-    for found in walk(file, file.size, damaged):
+    for found in walk(file, damaged):
         try:
             if isinstance(found, Place):
                 _add(contents, file, found)
@@ -160,7 +172,7 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
             chunk = file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
             messages = read_records(records_of(chunk))
             for opcode, content in messages.others:
-                _add_inside(contents, opcode, content, chunk.where)
+                add_definition(contents, opcode, content, chunk.where)
         except RecordsError as error:
             damaged(BagError(f"{chunk.where}: the chunk is damaged: {error}"))
             continue
@@ -170,62 +182,73 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
         counts.update(messages.topic_ids)
         if len(messages.log_times):
             times += min(messages.log_times), max(messages.log_times)
+    for topic_id in counts.keys() - contents.channels.keys():
+        damaged(
+            BagError(
+                f"{file.path}: {counts[topic_id]} messages are of channel {topic_id}, which is not there"
+            )
+        )
     contents.statistics = Statistics(dict(counts), min(times, default=0), max(times, default=0))
     return contents
 
 
-def walk(file: McapFile, end: int, damaged: Damaged) -> Iterator[Place | ChunkPlace | StoredChunk]:
-    """Yield what is in the data section, in its order: chunks, messages without one, and places of other records.
+def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | StoredChunk]:
+    """Yield what is in a file, in its order: chunks, messages without one, and places of other records.
 
     Args:
         file: The file.
-        end: Where the data section ends at the latest.
-        damaged: What to do where there is no record; if it returns, the next message or chunk is looked for.
+        damaged: What to do where there is no record; if it returns, the next record is looked for. Behind the
+            data, where no messages are lost, it is not called.
     """
-    start = len(MAGIC)
-    while start < end:
+    start, in_data = len(MAGIC), True
+    while start < file.size:
         try:
-            place = file.place(start, end)
-            if (place.opcode, place.end - place.content) in ((Opcode.DATA_END, 4), (Opcode.FOOTER, 20)):
-                return
+            place = file.place(start, file.size)
             found: Place | ChunkPlace | StoredChunk = place
             following = place.end
             if place.opcode == Opcode.MESSAGE:
-                found, following = file.loose_messages(place, end)
+                found, following = file.loose_messages(place)
             elif place.opcode == Opcode.CHUNK:
                 found = file.chunk(place)
+            elif place.opcode in _END_SIZES and place.end - place.content != _END_SIZES[place.opcode]:
+                raise file.damaged(place, f"it should have {_END_SIZES[place.opcode]} bytes")
+            elif place.opcode == Opcode.MESSAGE_INDEX and (place.end - place.content - 6) % 16:
+                raise file.damaged(place, "its last entry is not whole")
+            elif place.opcode == Opcode.DATA_END:
+                in_data = False
         except BagError as error:
+            if not in_data:
+                return
             damaged(error)
-            start = _find_record(file, start + 1, end)
+            start = _find_record(file, start + 1)
             continue
         yield found
+        if place.opcode == Opcode.FOOTER:
+            return
         start = following
 
 
-def add_schema(contents: Contents, schema: records.Schema, where: str) -> None:
-    """Add a schema, which may be there several times.
+def add_definition(contents: Contents, opcode: int, content: Buffer, where: str) -> None:
+    """Add a schema or a channel, which may be there several times; other kinds of records are left out.
 
     Raises:
-        BagError: There is another one with its id.
+        BagError: It is damaged, or there is another one with its id.
     """
-    known = contents.schemas.setdefault(schema.id, schema)
-    if known != schema:
-        raise BagError(
-            f"{where}: schema {schema.id} is `{schema.name}` here, and another `{known.name}` elsewhere"
-        )
-
-
-def add_channel(contents: Contents, channel: records.Channel, where: str) -> None:
-    """Add a channel, which may be there several times.
-
-    Raises:
-        BagError: There is another one with its id.
-    """
-    known = contents.channels.setdefault(channel.id, channel)
-    if known != channel:
-        raise BagError(
-            f"{where}: channel {channel.id} is `{channel.topic}` here, and another `{known.topic}` elsewhere"
-        )
+    what = f"{where}: {opcode_name(opcode)}"
+    if opcode == Opcode.SCHEMA:
+        schema = parse(records.Schema, content, what)
+        other = contents.schemas.setdefault(schema.id, schema)
+        if schema != other:
+            raise BagError(
+                f"{where}: schema {schema.id} is `{schema.name}` here, and another `{other.name}` elsewhere"
+            )
+    elif opcode == Opcode.CHANNEL:
+        channel = parse(records.Channel, content, what)
+        known = contents.channels.setdefault(channel.id, channel)
+        if channel != known:
+            raise BagError(
+                f"{where}: channel {channel.id} is `{channel.topic}` here, and another `{known.topic}` elsewhere"
+            )
 
 
 def missing_schemas(contents: Contents, path: str) -> list[BagError]:
@@ -241,23 +264,12 @@ def missing_schemas(contents: Contents, path: str) -> list[BagError]:
 
 def _add(contents: Contents, file: McapFile, place: Place) -> None:
     """Add a record of the data section."""
-    if place.opcode == Opcode.SCHEMA:
-        add_schema(contents, file.record(records.Schema, place), file.where(place.start))
-    elif place.opcode == Opcode.CHANNEL:
-        add_channel(contents, file.record(records.Channel, place), file.where(place.start))
+    if place.opcode in DEFINITIONS:
+        add_definition(contents, place.opcode, file.read(place.content, place.end), file.where(place.start))
     elif place.opcode == Opcode.METADATA:
         contents.metadata.append(file.record(records.Metadata, place))
     elif place.opcode == Opcode.ATTACHMENT:
         contents.attachments.append(place)
-
-
-def _add_inside(contents: Contents, opcode: int, content: Buffer, where: str) -> None:
-    """Add a record that is inside a chunk."""
-    what = f"{where}: {opcode_name(opcode)} in the chunk"
-    if opcode == Opcode.SCHEMA:
-        add_schema(contents, parse(records.Schema, content, what), where)
-    elif opcode == Opcode.CHANNEL:
-        add_channel(contents, parse(records.Channel, content, what), where)
 
 
 def _indexed(file: McapFile, offset: int, opcode: Opcode, index: Place) -> Place:
@@ -284,24 +296,28 @@ def _complete(contents: Contents, statistics: records.Statistics) -> bool:
     )
 
 
-def _find_record(file: McapFile, start: int, end: int) -> int:
-    """Return where the next chunk or message is, somewhere behind damage; `end` if there is none."""
-    while start < end:
-        piece_end = min(start + PIECE_SIZE, end)
-        for match in _CANDIDATE.finditer(file.read(start, piece_end)):
-            if _is_believable(file, start + match.start(), end):
+def _find_record(file: McapFile, start: int) -> int:
+    """Return where the next record is, somewhere behind damage; the end of the file if there is none."""
+    while start < file.size:
+        end = min(start + PIECE_SIZE, file.size)
+        try:
+            piece = file.read(start, end)
+        except BagError:
+            piece = b""  # a part of the disk that cannot be read, which was said at the first record in it
+        for match in _CANDIDATE.finditer(piece):
+            if _is_believable(file, start + match.start()):
                 return start + match.start()
-        start = piece_end if piece_end == end else piece_end - RECORD_HEAD.size
-    return end
+        start = end if end == file.size else end - RECORD_HEAD.size
+    return file.size
 
 
-def _is_believable(file: McapFile, start: int, end: int) -> bool:
-    """Return whether a chunk begins at a place, or a message that other records follow."""
+def _is_believable(file: McapFile, start: int) -> bool:
+    """Return whether a chunk begins at a place, or a record that others follow."""
     try:
-        for place in islice(file.places(start, end), _BELIEVABLE_RECORDS):
+        for place in islice(file.places(start, file.size), _BELIEVABLE_RECORDS):
             if place.opcode == Opcode.CHUNK:
                 return file.chunk(place).compression in COMPRESSIONS
-            if place.opcode not in tuple(Opcode):
+            if place.opcode not in KNOWN_OPCODES:
                 return False
     except BagError:
         return False

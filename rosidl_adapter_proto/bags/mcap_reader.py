@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import BinaryIO, TypeVar
 
@@ -10,21 +10,22 @@ from mcap import records
 from mcap.opcode import Opcode
 
 from rosidl_adapter_proto.bags.mcap_contents import (
+    DEFINITIONS,
     Contents,
-    add_channel,
-    add_schema,
+    add_definition,
     find_end,
     missing_schemas,
+    read_footer,
     read_summary,
     scan,
     walk,
 )
-from rosidl_adapter_proto.bags.mcap_records import MAGIC, ChunkPlace, McapFile, Place
+from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, Place
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
 from rosidl_adapter_proto.errors import BagError
 
-_SALVAGE = "`--on-error skip` reads what is whole"
+_SALVAGE = "`--on-error skip` reads"
 
 _Chunk = TypeVar("_Chunk", ChunkPlace, StoredChunk)
 
@@ -51,16 +52,21 @@ class McapReader:
 
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path
-        self.warnings: list[str] = []
+        self._warnings: dict[str, None] = {}
         self._file = McapFile(file, path)
         self._salvage = salvage
         self.profile = self._read_header().profile
         contents = self._contents = self._read_contents()
         for error in missing_schemas(contents, path):
             self._damaged(error)
-        self.topics = read_topics(contents.channels, contents.schemas, contents.metadata)
+        self.topics = read_topics(contents.channels, contents.schemas, contents.metadata, path)
         self.statistics = contents.statistics
         self.metadata = [(record.name, record.metadata) for record in contents.metadata]
+
+    @property
+    def warnings(self) -> Sequence[str]:
+        """What is odd about the file; there may be more of it after `chunks`, which notices what is damaged there."""
+        return list(self._warnings)
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the attachments of the file; see `StorageReader.attachments`."""
@@ -78,20 +84,21 @@ class McapReader:
         """Yield the chunks that may have messages of a selection; see `StorageReader.chunks`."""
         if in_time_order:
             places = sorted(self._chunks(selection, _without_data), key=lambda place: place.start_time)
-            yield from map(self._file.stored_chunk, places)
+            yield from filter(None, map(self._with_data, places))
         else:
             yield from self._chunks(selection, self._with_data)
 
     def _chunks(
-        self, selection: Selection, found_as: Callable[[ChunkPlace | StoredChunk], _Chunk]
+        self, selection: Selection, found_as: Callable[[ChunkPlace | StoredChunk], _Chunk | None]
     ) -> Iterator[_Chunk]:
         """Yield the chunks that may have messages of a selection, in the order of the file."""
         chunk: _Chunk | None = None
+        last: ChunkPlace | StoredChunk | None = None
         chunk_count = 0
         message_counts: list[int | None] = []
-        for found in walk(self._file, self._file.size, self._damaged):
+        for found in walk(self._file, self._damaged):
             if isinstance(found, Place) and found.opcode == Opcode.MESSAGE_INDEX:
-                if message_counts:
+                if isinstance(last, ChunkPlace):
                     message_counts[-1] = (message_counts[-1] or 0) + (found.end - found.content - 6) // 16
                 continue
             # The indexes of a chunk are behind it, and nothing is read twice.
@@ -101,6 +108,7 @@ class McapReader:
             if isinstance(found, Place):
                 self._check(found)
                 continue
+            last = found
             chunk_count += isinstance(found, ChunkPlace)
             message_counts.append(found.message_count if isinstance(found, StoredChunk) else None)
             if _in_time(found, selection) and self._has_topics(found, selection):
@@ -109,9 +117,6 @@ class McapReader:
             yield replace(chunk, message_count=message_counts[-1])
         self._check_counts(chunk_count, message_counts)
 
-    def _with_data(self, chunk: ChunkPlace | StoredChunk) -> StoredChunk:
-        return chunk if isinstance(chunk, StoredChunk) else self._file.stored_chunk(chunk)
-
     def __enter__(self) -> McapReader:
         return self
 
@@ -119,8 +124,11 @@ class McapReader:
         self._file.close()
 
     def _read_header(self) -> records.Header:
-        if self._file.size < len(MAGIC) or self._file.read(0, len(MAGIC)) != MAGIC:
-            raise BagError(f"{self.path}: this is no MCAP file: it does not begin with the bytes of one")
+        start = self._file.read(0, min(len(MAGIC), self._file.size))
+        if start != MAGIC:
+            raise BagError(
+                f"{self.path}: this is no MCAP file: it {f'begins with {start!r}' if start else 'is empty'}"
+            )
         try:
             place = self._file.place(len(MAGIC), self._file.size)
             return self._file.record(records.Header, place)
@@ -130,21 +138,26 @@ class McapReader:
 
     def _read_contents(self) -> Contents:
         """Return what the summary says, or else what the whole file says."""
+        why, wrong = "the recording was not finished: it has no end", None
+        footer = read_footer(self._file)
+        if footer is not None:
+            why = "the summary is missing, or leaves something out"
+            try:
+                if contents := read_summary(self._file, footer):
+                    return contents
+            except BagError as error:
+                why, wrong = "the summary is not used", error
         end = find_end(self._file)
-        if end is None:
-            return self._scan("the recording was not finished: it has no end")
-        if end < self._file.size:
+        if end is not None and end < self._file.size:
             garbage = self._file.size - end
             self._damaged(
                 BagError(f"{self._file.where(end)}: the recording ends here, and {garbage} bytes follow")
             )
             self._file.size = end
-        try:
-            contents = read_summary(self._file)
-        except BagError as error:
-            self._damaged(error)
-            return self._scan("the summary is not used")
-        return contents or self._scan("the summary is missing, or leaves something out")
+            return self._read_contents()
+        if wrong is not None:
+            self._damaged(wrong)
+        return self._scan(why)
 
     def _scan(self, why: str) -> Contents:
         """Return what is in the whole file; all damage is looked for before it is reported."""
@@ -152,8 +165,8 @@ class McapReader:
         contents = scan(self._file, damages.append)
         count = contents.statistics.message_count
         if damages and not self._salvage:
-            raise BagError(f"{damages[0]}; {count} messages are whole; {_SALVAGE}") from damages[0]
-        self.warnings.append(f"{self.path}: {why}; it was searched, and {count} messages were found")
+            raise BagError(f"{damages[0]}; {count} messages are whole, and {_SALVAGE} them") from damages[0]
+        self._warn(f"{self.path}: {why}; it was searched, and {count} messages were found")
         for error in damages:
             self._damaged(error)
         return contents
@@ -161,26 +174,26 @@ class McapReader:
     def _damaged(self, error: BagError) -> None:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
-            raise BagError(f"{error}; {_SALVAGE}") from error
+            raise BagError(f"{error}; {_SALVAGE} what is whole") from error
         self._warn(str(error))
 
     def _warn(self, warning: str) -> None:
-        if warning not in self.warnings:
-            self.warnings.append(warning)
+        self._warnings[warning] = None
 
     def _check(self, place: Place) -> None:
-        """Compare a record of the data section with what is known of the file."""
+        """Compare a record with what is known of the file."""
         where = self._file.where(place.start)
+        if place.opcode not in KNOWN_OPCODES:
+            self._warn(f"{where}: {place.name} is left out")
+        if place.opcode not in DEFINITIONS:
+            return
+        channels = self._contents.channels
         try:
-            if place.opcode == Opcode.SCHEMA:
-                add_schema(self._contents, self._file.record(records.Schema, place), where)
-            elif place.opcode == Opcode.CHANNEL:
-                channel = self._file.record(records.Channel, place)
-                add_channel(self._contents, channel, where)
-                if channel.id not in self.topics:
-                    raise BagError(f"{where}: channel {channel.id} (`{channel.topic}`) is not in the summary")
-            elif place.opcode not in tuple(Opcode):
-                self._warn(f"{where}: {place.name} is left out")
+            add_definition(self._contents, place.opcode, self._file.read(place.content, place.end), where)
+            for topic_id in channels.keys() - self.topics.keys():
+                raise BagError(
+                    f"{self.path}: channel {topic_id} (`{channels[topic_id].topic}`) is not in the summary"
+                )
         except BagError as error:
             self._damaged(error)
 
@@ -201,6 +214,16 @@ class McapReader:
                     f"{self.path}: the summary counts {message_count} messages, and there are {sum(counts)}"
                 )
             )
+
+    def _with_data(self, found: ChunkPlace | StoredChunk) -> StoredChunk | None:
+        """Return a chunk with its data; None if it cannot be read, which is noted."""
+        if isinstance(found, StoredChunk):
+            return found
+        try:
+            return self._file.stored_chunk(found)
+        except BagError as error:
+            self._damaged(error)
+            return None
 
     def _has_topics(self, chunk: ChunkPlace | StoredChunk, selection: Selection) -> bool:
         """Return whether a chunk may have messages of the topics of a selection, as far as the summary says."""

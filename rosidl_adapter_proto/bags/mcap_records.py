@@ -35,12 +35,14 @@ FOOTER_SIZE = RECORD_HEAD.size + 20
 
 # What is read at once has bounds, whatever a file says. Kinds that we do not know are never read.
 _LARGEST_RECORDS = {
-    **dict.fromkeys(Opcode, 256 * 1024 * 1024),
+    **dict.fromkeys(Opcode, 64 * 1024 * 1024),
+    Opcode.MESSAGE_INDEX: MAXIMUM_CHUNK_SIZE,
     Opcode.CHUNK: MAXIMUM_CHUNK_SIZE,
     Opcode.MESSAGE: MAXIMUM_CHUNK_SIZE,
     Opcode.ATTACHMENT: MAXIMUM_CHUNK_SIZE,
 }
 _LONGEST_COMPRESSION = 32
+KNOWN_OPCODES = frozenset(Opcode)
 PIECE_SIZE = 1024 * 1024
 """How much is read at once where nothing else says."""
 
@@ -108,8 +110,11 @@ class McapFile:
 
     def read(self, start: int, end: int) -> bytes:
         """Return the bytes from one place to another, both in the file."""
-        self._file.seek(start)
-        data = self._file.read(end - start)
+        try:
+            self._file.seek(start)
+            data = self._file.read(end - start)
+        except OSError as error:
+            raise BagError(f"{self.where(start)}: it cannot be read: {error.strerror or error}") from error
         if len(data) != end - start:
             raise BagError(f"{self.where(start)}: the file became shorter while it was read")
         return data
@@ -201,7 +206,7 @@ class McapFile:
         try:
             compression = head[CHUNK_HEAD.size : name_end].decode()
         except UnicodeDecodeError as error:
-            raise self.damaged(place, str(error)) from error
+            raise self.damaged(place, "a text in it is not UTF-8") from error
         data_size = int.from_bytes(head[name_end : name_end + 8], "little")
         data_start = place.content + name_end + 8
         if data_start + data_size != place.end:
@@ -226,16 +231,15 @@ class McapFile:
             chunk.start,
         )
 
-    def loose_messages(self, first: Place, limit: int) -> tuple[StoredChunk, int]:
+    def loose_messages(self, first: Place) -> tuple[StoredChunk, int]:
         """Return Message records that are in no chunk, as if they were one, and the place behind them.
 
         They are about 1 MB, but always at least the one message.
 
         Args:
             first: The first of them.
-            limit: The place behind the last record of the file that may be one.
         """
-        piece = self.read(first.start, max(first.end, min(first.start + PIECE_SIZE, limit)))
+        piece = self.read(first.start, max(first.end, min(first.start + PIECE_SIZE, self.size)))
         position, count, start_time, end_time = 0, 0, 2**64 - 1, 0
         while position + MESSAGE_HEAD.size <= len(piece):
             opcode, length, _, _, log_time, _ = MESSAGE_HEAD.unpack_from(piece, position)
@@ -257,7 +261,8 @@ def opcode_name(opcode: int) -> str:
     """Return what kind of record it is, for people: `a Chunk record`."""
     for kind in Opcode:
         if kind == opcode:
-            return f"a {kind.name.title().replace('_', '')} record"
+            name = kind.name.title().replace("_", "")
+            return f"{'an' if name[0] in 'AEIOU' else 'a'} {name} record"
     return f"a record of the unknown kind {opcode:#04x}"
 
 
@@ -274,9 +279,11 @@ def parse(kind: type[_Record], content: Buffer, what: str) -> _Record:
     """
     try:
         record: _Record = kind.read(_ExactStream(BytesIO(content)))  # type: ignore[attr-defined]
-    except EndOfFile as error:
+    except (EndOfFile, OverflowError) as error:
         raise BagError(f"{what} is damaged: a length in it points behind its end") from error
-    except (McapError, struct.error, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise BagError(f"{what} is damaged: a text in it is not UTF-8") from error
+    except (McapError, struct.error) as error:
         raise BagError(f"{what} is damaged: {error}") from error
     return record
 

@@ -10,9 +10,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-import yaml
 from mcap.records import Channel, Metadata, Schema
 
+from rosidl_adapter_proto.bags.metadata import read_metadata
 from rosidl_adapter_proto.bags.model import CDR, ROS1, RecordedDefinition, Topic
 
 QOS_PROFILES = "offered_qos_profiles"
@@ -27,7 +27,7 @@ _ROS_NAME = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
 
 
 def read_topics(
-    channels: Mapping[int, Channel], schemas: Mapping[int, Schema], metadata: Sequence[Metadata]
+    channels: Mapping[int, Channel], schemas: Mapping[int, Schema], metadata: Sequence[Metadata], path: str
 ) -> dict[int, Topic]:
     """Return the topics of a file, by the ids of their channels.
 
@@ -35,13 +35,17 @@ def read_topics(
         channels: All channels, by their ids.
         schemas: All schemas, by their ids; a channel may be without.
         metadata: All metadata records, in the order of the file.
+        path: The file, for people.
+
+    Raises:
+        BagError: The description of rosbag2 is needed and damaged.
     """
     topics = {
         topic_id: _read_topic(channel, schemas.get(channel.schema_id))
         for topic_id, channel in channels.items()
     }
     if not all(topic.type_name for topic in topics.values()):
-        types = _rosbag2_types(metadata)
+        types = _rosbag2_types(metadata, path)
         topics = {
             topic_id: topic if topic.type_name else replace(topic, type_name=types.get(topic.name, ""))
             for topic_id, topic in topics.items()
@@ -128,19 +132,10 @@ def _ros_definitions(metadata: Iterable[Metadata]) -> dict[str, RecordedDefiniti
     return definitions
 
 
-def _rosbag2_types(metadata: Iterable[Metadata]) -> dict[str, str]:
+def _rosbag2_types(metadata: Iterable[Metadata], path: str) -> dict[str, str]:
     """Return the types by the names of the topics, as rosbag2's own description has them; the last one counts."""
-    descriptions = [record for record in metadata if record.name == ROSBAG2]
-    if not descriptions:
+    texts = [record.metadata.get("serialized_metadata", "") for record in metadata if record.name == ROSBAG2]
+    if not texts:
         return {}
-    try:
-        description = yaml.safe_load(descriptions[-1].metadata.get("serialized_metadata", ""))
-    except (yaml.YAMLError, RecursionError, ValueError):
-        return {}  # a topic without a type can be copied, and whoever needs the type says that it is missing
-    listed = description.get("topics_with_message_count") if isinstance(description, dict) else None
-    entries = [entry.get("topic_metadata") for entry in listed or () if isinstance(entry, dict)]
-    return {
-        str(entry["name"]): str(entry.get("type", ""))
-        for entry in entries
-        if isinstance(entry, dict) and "name" in entry
-    }
+    description = read_metadata(texts[-1].encode(), f"{path}, the metadata in it")
+    return {information.topic.name: information.topic.type_name for information in description.topics}

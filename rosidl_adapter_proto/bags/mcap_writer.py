@@ -66,7 +66,6 @@ class McapWriter:
         path: The file, for people.
         profile: `ros2` for CDR alone, else empty: the profile makes CDR mandatory (https://mcap.dev/spec/registry#ros2).
         compression: `zstd`, `lz4` or empty.
-        level: How hard to compress, in the numbers of the compression; by default as rosbag2 does.
 
     Raises:
         BagError: There is no such compression.
@@ -74,14 +73,11 @@ class McapWriter:
 
     storage = "mcap"
 
-    def __init__(
-        self, file: BinaryIO, path: str, *, profile: str, compression: str = "", level: int | None = None
-    ) -> None:
+    def __init__(self, file: BinaryIO, path: str, *, profile: str, compression: str = "") -> None:
         if compression not in COMPRESSIONS:
             raise BagError(f"the compression `{compression}` is unknown to MCAP; these are known: zstd, lz4")
         self.path = path
         self.compression = compression
-        self.level = level
         self._file = file
         self._size = 0
         self._topics: dict[int, Topic] = {}
@@ -122,7 +118,7 @@ class McapWriter:
     def pack(self, records: Buffer) -> PackedMcapChunk:
         """Return a chunk ready to be written; see `StorageWriter.pack`."""
         return PackedMcapChunk(
-            compress(records, self.compression, self.level),
+            compress(records, self.compression),
             memoryview(records).nbytes,
             zlib.crc32(records),
             index_records(records),

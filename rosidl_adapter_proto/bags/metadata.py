@@ -19,7 +19,9 @@ NEWEST_VERSION = 9
 WRITTEN_VERSION = 8
 """What is written: version 9 has nothing that 8 has not, and rosbag2 of Humble and Iron cannot read it."""
 
-_MAXIMUM_SIZE = 16 * 2**20
+MAXIMUM_SIZE = 16 * 2**20
+"""The largest metadata.yaml that is read, in bytes."""
+
 _ROOT = "rosbag2_bagfile_information"
 
 
@@ -84,10 +86,8 @@ def read_metadata(data: bytes, path: str) -> BagMetadata:
     Raises:
         BagError: It is no metadata of a version that is known here; the message says where it is wrong.
     """
-    if len(data) > _MAXIMUM_SIZE:
-        raise BagError(
-            f"{path}: {len(data)} bytes are too large for metadata of a bag (at most {_MAXIMUM_SIZE})"
-        )
+    if len(data) > MAXIMUM_SIZE:
+        raise BagError(f"{path}: too large for metadata of a bag: more than {MAXIMUM_SIZE} bytes")
     try:
         text = data.decode()
     except UnicodeDecodeError as error:

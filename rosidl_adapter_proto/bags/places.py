@@ -144,7 +144,7 @@ class RemotePath:
 
     def _file_system(self) -> tuple[Any, str]:
         try:
-            from fsspec.core import url_to_fs  # type: ignore[import-untyped]
+            from fsspec.core import url_to_fs
         except ImportError:
             raise RequestError(
                 f"{self}: URLs need fsspec; `pip install rosidl-adapter-proto[remote]`"

@@ -84,7 +84,7 @@ def recognize(path: str) -> RecordedFile:
         if head.startswith(magic):
             return RecordedFile(path, storage, compressed)
     if not head:
-        raise BagError(f"{path}: empty")
+        raise BagError(f"{path}: {'cut off: nothing in it can be decompressed' if compressed else 'empty'}")
     raise BagError(f"{path}: neither MCAP nor sqlite3 nor a ROS 1 bag: it begins with {head.hex(' ')}")
 
 
@@ -112,10 +112,11 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
         BagError: It cannot be read.
     """
     with ExitStack() as stack:
-        path = _decompressed(file.path, stack) if file.compressed else file.path
-        if file.storage == SQLITE3:  # whose library reads nothing but files of this machine
-            path = str(stack.enter_context(local_copy(find_place(path), JOURNAL_SUFFIXES)))
-        reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage))
+        try:
+            path = _decompressed(file.path, stack) if file.compressed else file.path
+            reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage, stack))
+        except OSError as error:  # also of temporary files, such as that the disk is full
+            raise BagError(f"{file.path}: cannot be opened: {error}") from None
         return _OpenedFile(reader, metadata, stack)
 
 
@@ -154,32 +155,47 @@ def _decompressed(path: str, stack: ExitStack) -> str:
     target = Path(folder, find_place(path).name.removesuffix(ZSTD_SUFFIX))
     room = shutil.disk_usage(folder).free - _SPARE_SPACE
     with open_file(path) as source, target.open("wb") as file:
-        try:
-            for piece in zstandard.ZstdDecompressor().read_to_iter(source):
-                room -= len(piece)
-                if room < 0:
-                    raise BagError(
-                        f"{path}: too large to be decompressed in {folder}; set TMPDIR to a larger disk"
-                    )
-                file.write(piece)
-        except zstandard.ZstdError as error:
-            raise BagError(f"{path}: damaged zstd, after {file.tell()} bytes: {error}") from None
+        for piece in _decompressed_pieces(source, path):
+            room -= len(piece)
+            if room < 0:
+                raise BagError(
+                    f"{path}: too large to be decompressed in {folder}; set TMPDIR to a larger disk"
+                )
+            file.write(piece)
     return str(target)
 
 
-def _open_mcap(path: str, name: str, salvage: bool) -> StorageReader:
-    return McapReader(open_file(path), name, salvage=salvage)
+def _decompressed_pieces(source: BinaryIO, path: str) -> Iterator[bytes]:
+    """Yield what the zstd frames of a file have, in pieces of at most 128 MiB: 2^15 times what is read for each."""
+    frame = zstandard.ZstdDecompressor().decompressobj()
+    while data := source.read(4096):
+        while data:
+            if frame.eof:
+                frame = zstandard.ZstdDecompressor().decompressobj()
+            try:
+                yield frame.decompress(data)
+            except zstandard.ZstdError as error:
+                raise BagError(f"{path}: damaged zstd before byte {source.tell()}: {error}") from None
+            data = frame.unused_data if frame.eof else b""
+    if not frame.eof:
+        raise BagError(f"{path}: cut off: its compressed data does not end at its last byte, {source.tell()}")
 
 
-def _open_ros1(path: str, name: str, salvage: bool) -> StorageReader:
-    return Ros1Reader(open_file(path), name, salvage=salvage)
+def _open_mcap(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    return McapReader(stack.enter_context(open_file(path)), name, salvage=salvage)
 
 
-def _open_sqlite3(path: str, name: str, salvage: bool) -> StorageReader:
-    return SqliteReader(path, name, salvage=salvage)
+def _open_ros1(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    return Ros1Reader(stack.enter_context(open_file(path)), name, salvage=salvage)
 
 
-_OPENERS: Mapping[str, Callable[[str, str, bool], StorageReader]] = {
+def _open_sqlite3(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
+    # Its library reads nothing but files of this machine.
+    copy = stack.enter_context(local_copy(find_place(path), JOURNAL_SUFFIXES))
+    return SqliteReader(str(copy), name, salvage=salvage)
+
+
+_OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {
     MCAP: _open_mcap,
     SQLITE3: _open_sqlite3,
     ROSBAG: _open_ros1,

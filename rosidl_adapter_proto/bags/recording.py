@@ -10,12 +10,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
+from rosidl_adapter_proto.bags.metadata import MAXIMUM_SIZE, METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.places import Place, find_place
 from rosidl_adapter_proto.bags.recorded_file import (
     SUFFIXES,
     ZSTD_SUFFIX,
     RecordedFile,
+    open_file,
     open_reader,
     recognize,
 )
@@ -88,7 +89,7 @@ def _folder(folder: Place) -> Recording:
         (path for path in folder.iterdir() if Path(_plain_name(path)).suffix in SUFFIXES and path.is_file()),
         key=str,
     )
-    metadata = read_metadata(place.read_bytes(), str(place)) if place.is_file() else None
+    metadata = _read_metadata(place)
     if metadata is not None and metadata.paths:
         return _listed_files(folder, metadata, present)
     if not present:
@@ -144,11 +145,18 @@ def _by_start_time(files: list[RecordedFile]) -> list[RecordedFile]:
 def _metadata_beside(path: Place) -> tuple[BagMetadata | None, tuple[str, ...]]:
     """Return the metadata in the folder of a file, if it is about that file."""
     place = path.parent / METADATA_FILE
-    if not place.is_file():
-        return None, ()
     try:
-        metadata = read_metadata(place.read_bytes(), str(place))
+        metadata = _read_metadata(place)
     except BagError as error:
         return None, (f"{error} (read without it)",)
+    if metadata is None:
+        return None, ()
     names = {_plain_name(Path(name)) for name in metadata.paths}
     return (metadata if _plain_name(path) in names else None), ()
+
+
+def _read_metadata(place: Place) -> BagMetadata | None:
+    if not place.is_file():
+        return None
+    with open_file(str(place)) as file:
+        return read_metadata(file.read(MAXIMUM_SIZE + 1), str(place))

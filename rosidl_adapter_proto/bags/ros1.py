@@ -9,8 +9,8 @@ from __future__ import annotations
 import bz2
 import struct
 from array import array
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -32,6 +32,7 @@ from rosidl_adapter_proto.transcode.records import pack_records
 _MAGIC = b"#ROSBAG V2.0\n"
 _KEPT_FIELDS = ("md5sum", "latching")
 _MAXIMUM_TOPIC_COUNT = 2**16 - 1
+_MAXIMUM_WARNING_COUNT = 20
 _PIECE_SIZE = 2**20  # bytes of messages outside of chunks that make a chunk, about
 
 
@@ -78,7 +79,8 @@ class _Contents:
         self.counts[self.topic_id(number, where)] += count
 
     def add_times(self, *times: int) -> None:
-        self.times = min(self.times + times), max(self.times + times)
+        if times:
+            self.times = min(self.times + times), max(self.times + times)
 
 
 @dataclass
@@ -91,8 +93,9 @@ class _Messages:
     size: int = 0
 
     def add(self, record: Record, contents: _Contents) -> None:
-        self.topic_ids.append(contents.topic_id(record.number(b"conn"), record.where))
-        self.times.append(record.time(b"time"))
+        topic_id, time = contents.topic_id(record.number(b"conn"), record.where), record.time(b"time")
+        self.topic_ids.append(topic_id)
+        self.times.append(time)
         self.data.append(record.data())
         self.size += record.size
 
@@ -172,15 +175,12 @@ class Ros1Reader:
             if place == self._source.size:
                 yield from self._loose_chunks(self._source.size)  # as one, since others may lie between
             elif self._selected(place, selection):
-                with self._tolerating():
-                    yield from self._chunk(self._source.record(place))
+                yield from self._chunk(self._source.record(place))
 
     def _chunk(self, chunk: Record) -> Iterator[StoredChunk]:
         messages = _Messages()
-        with self._tolerating():
-            for record in _chunk_records(chunk):
-                if record.operation == Operation.MESSAGE:
-                    messages.add(record, self._contents)
+        for record in self._inside(chunk):
+            self._add(record, messages)
         if messages.data:
             yield messages.chunk(chunk.where, chunk.place)
 
@@ -188,32 +188,44 @@ class Ros1Reader:
         """Yield the messages of the chunk that the recorder was writing when it was killed: they are in no chunk."""
         messages = _Messages()
         for record in self._records(len(_MAGIC)):
-            if record.operation == Operation.MESSAGE:
-                with self._tolerating():
-                    messages.add(record, self._contents)
-                if messages.size >= size:
-                    yield messages.chunk(record.where, record.place)
-                    messages = _Messages()
+            self._add(record, messages)
+            if messages.size >= size:
+                yield messages.chunk(record.where, record.place)
+                messages = _Messages()
         if messages.data:
             yield messages.chunk(f"{self.path}, the messages at its end", self._source.size)
+
+    def _add(self, record: Record, messages: _Messages) -> None:
+        if record.operation == Operation.MESSAGE:
+            try:
+                messages.add(record, self._contents)
+            except BagError as error:
+                self._tolerate(error, "it is left out")
 
     def _selected(self, place: int, selection: Selection) -> bool:
         first, last = self._contents.chunk_times.get(place, (selection.start_time, selection.start_time))
         return last >= selection.start_time and (selection.end_time is None or first < selection.end_time)
 
     def _records(self, start: int) -> Iterator[Record]:
-        with self._tolerating():
-            yield from self._source.records(start)
-
-    @contextmanager
-    def _tolerating(self) -> Iterator[None]:
-        """Say what is damaged, instead of raising an error, if the bag is to be salvaged or not finished anyway."""
+        """Yield the records of the file from a place on."""
         try:
-            yield
+            yield from self._source.records(start)
         except BagError as error:
-            if not self._tolerant:
-                raise
-            self._warn(f"{error}; what follows there is left out")
+            self._tolerate(error, "what follows there is left out")
+
+    def _inside(self, chunk: Record) -> Iterator[Record]:
+        """Yield the records in a chunk."""
+        try:
+            yield from _chunk_records(chunk)
+        except BagError as error:
+            self._tolerate(error, "what follows there is left out")
+
+    def _tolerate(self, error: BagError, consequence: str) -> None:
+        """Say what is damaged, instead of raising an error, if the bag is to be salvaged or not finished anyway."""
+        if not self._tolerant:
+            raise error
+        if len(self.warnings) < _MAXIMUM_WARNING_COUNT:
+            self._warn(f"{error}; {consequence}")
 
     def _warn(self, warning: str) -> None:
         if warning not in self.warnings:
@@ -265,23 +277,30 @@ class Ros1Reader:
             self._contents.add_times(*times)
 
     def _scan(self) -> None:
+        """Find out what is in a bag without an index."""
+        counts: Counter[int] = Counter()
         for record in self._records(len(_MAGIC)):
-            times: list[int] = []
-            with self._tolerating():
-                for inner in _chunk_records(record) if record.operation == Operation.CHUNK else (record,):
+            in_chunk = record.operation == Operation.CHUNK
+            times: tuple[int, ...] = ()
+            for inner in self._inside(record) if in_chunk else (record,):
+                try:
                     if inner.operation == Operation.CONNECTION:
                         self._contents.add_connection(inner)
                     elif inner.operation == Operation.MESSAGE:
-                        self._contents.add_messages(inner.number(b"conn"), 1, inner.where)
-                        times = [min([*times, inner.time(b"time")]), max([*times, inner.time(b"time")])]
-            if not times:
-                continue
-            self._contents.add_times(*times)
-            if record.operation == Operation.CHUNK:
+                        number, time = inner.number(b"conn"), inner.time(b"time")
+                        counts[number] += 1
+                        times = min((time, *times)), max((time, *times))
+                except BagError as error:
+                    self._tolerate(error, "it is left out")
+            if times and in_chunk:
                 self._contents.chunk_times[record.place] = times[0], times[1]
-            else:
-                loose = self._contents.loose_start
-                self._contents.loose_start = times[0] if loose is None else min(loose, times[0])
+            elif times:
+                known = self._contents.loose_start
+                self._contents.loose_start = times[0] if known is None else min(times[0], known)
+            self._contents.add_times(*times)
+        for number, count in counts.items():
+            if number in self._contents.topic_ids:
+                self._contents.add_messages(number, count, self.path)
 
 
 def _chunk_records(chunk: Record) -> Iterator[Record]:

@@ -54,7 +54,10 @@ class Source:
         size = self._size_at(data_start - 4, start)
         self._check(data_start + size, start)
         fields = read_fields(self.read(start + 4, header_size), f"{self.where} at byte {start}")
-        return Record(self, start, fields, data_start, size)
+        operation = fields.get(b"op", b"")
+        if len(operation) != 1:
+            raise BagError(f"{self.where} at byte {start}: damaged: a record that does not say what it is")
+        return Record(self, start, operation[0], fields, data_start, size)
 
     def _size_at(self, place: int, record: int) -> int:
         self._check(place + 4, record)
@@ -75,6 +78,7 @@ class Record:
     Attributes:
         source: What it is in.
         place: Where it begins.
+        operation: What it is: an `Operation`, unless it is unknown.
         fields: The fields of its header.
         start: Where its data begins.
         size: The size of its data in bytes.
@@ -82,6 +86,7 @@ class Record:
 
     source: Source
     place: int
+    operation: int
     fields: Mapping[bytes, bytes] = field(repr=False)
     start: int
     size: int
@@ -90,11 +95,6 @@ class Record:
     def where(self) -> str:
         """Its place, for people."""
         return f"{self.source.where} at byte {self.place}"
-
-    @property
-    def operation(self) -> int:
-        """What it is: an `Operation`, unless it is unknown."""
-        return self.number(b"op", 1)
 
     def data(self) -> memoryview:
         """Return its data."""

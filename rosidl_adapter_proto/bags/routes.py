@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fnmatch import fnmatchcase
+from functools import cached_property
 
 from rosidl_adapter_proto.bags.conversion import DEFAULT_FORMATS, OnError, Settings
-from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, RecordedDefinition, Statistics, Topic
+from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Statistics, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition
 from rosidl_adapter_proto.converters.ros1 import check_ros2_type
 from rosidl_adapter_proto.errors import BagError, ConverterError
+from rosidl_adapter_proto.interfaces.recorded import ROS1MSG
 from rosidl_adapter_proto.schema.registry import Schema
 
 MIXED_FORMATS = (
@@ -108,57 +110,69 @@ def plan_routes(
     Raises:
         BagError: Nothing is known of the type of a topic that has messages.
     """
+    ros2_types = _Ros2Types(settings)
     selected = selected_topics(topics, settings)
-    return {
-        topic_id: (
-            _route(
-                selected[topic_id],
-                bool(statistics.message_counts.get(topic_id)),
-                settings.on_error,
-                target_format,
-                types,
-            )
-            if topic_id in selected
-            else TopicRoute(topic, Fate.NOT_SELECTED)
+    routes = {topic_id: TopicRoute(topic, Fate.NOT_SELECTED) for topic_id, topic in topics.items()}
+    for topic_id, topic in selected.items():
+        if topic.serialization_format == target_format:
+            routes[topic_id] = TopicRoute(topic, Fate.COPIED, topic)
+            continue
+        try:
+            routes[topic_id] = _converted(topic, target_format, types, ros2_types)
+        except (BagError, ConverterError) as error:
+            if not statistics.message_counts.get(topic_id):
+                routes[topic_id] = TopicRoute(topic, Fate.COPIED, _without_definition(topic, target_format))
+            elif settings.on_error is OnError.STOP:
+                raise
+            elif settings.on_error is OnError.COPY:
+                routes[topic_id] = TopicRoute(topic, Fate.COPIED, topic, reason=str(error))
+            else:
+                routes[topic_id] = TopicRoute(topic, Fate.SKIPPED, reason=str(error))
+    return routes
+
+
+class _Ros2Types:
+    """Types of ROS 2 for messages that ROS 1 has recorded, which are looked for where the bag is not."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+
+    @cached_property
+    def _types(self) -> BagTypes:
+        return BagTypes((), self._settings.include, self._settings.distro)
+
+    def find(self, topic: Topic, ros1: Schema) -> tuple[Schema, RecordedDefinition]:
+        """Return the type that messages of a topic get, and its definition.
+
+        Raises:
+            BagError: ROS 2 has no such type.
+            ConverterError: It has not all that the type of ROS 1 has.
+        """
+        ros2 = replace(
+            topic,
+            serialization_format=CDR,
+            definition=RecordedDefinition(),
+            ros_definition=RecordedDefinition(),
+            type_hash="",
         )
-        for topic_id, topic in topics.items()
-    }
+        found = self._types.schema(ros2)
+        check_ros2_type(ros1, found)
+        return found, self._types.ros_definition(ros2)
 
 
-def _route(
-    topic: Topic, has_messages: bool, on_error: OnError, target_format: str, types: BagTypes
-) -> TopicRoute:
-    if topic.serialization_format == target_format:
-        return TopicRoute(topic, Fate.COPIED, topic)
-    try:
-        schema = types.schema(topic)
-        if topic.serialization_format == ROS1 and target_format != PROTOBUF:
-            result_schema, ros_definition = _ros2_type(topic, schema, types)
-        else:
-            result_schema, ros_definition = schema, types.ros_definition(topic)
-    except (BagError, ConverterError) as error:
-        if not has_messages:
-            return TopicRoute(topic, Fate.COPIED, _without_definition(topic, target_format))
-        if on_error is OnError.STOP:
-            raise
-        if on_error is OnError.COPY:
-            return TopicRoute(topic, Fate.COPIED, topic, reason=str(error))
-        return TopicRoute(topic, Fate.SKIPPED, reason=str(error))
-    result = _result(topic, target_format, result_schema, ros_definition)
-    return TopicRoute(topic, Fate.CONVERTED, result, schema, result_schema)
-
-
-def _ros2_type(topic: Topic, schema: Schema, types: BagTypes) -> tuple[Schema, RecordedDefinition]:
-    """Return the type of ROS 2 that messages of ROS 1 get, and its definition.
+def _converted(topic: Topic, target_format: str, types: BagTypes, ros2_types: _Ros2Types) -> TopicRoute:
+    """Return the route of a topic whose messages are converted.
 
     Raises:
-        BagError: ROS 2 has no such type.
-        ConverterError: It has not all that the type of ROS 1 has.
+        BagError: Its type is not known.
+        ConverterError: It is a type of ROS 1, and ROS 2 has not all of it.
     """
-    ros2 = replace(topic, serialization_format=CDR, definition=RecordedDefinition(), type_hash="")
-    result = types.schema(ros2)
-    check_ros2_type(schema, result)
-    return result, types.ros_definition(ros2)
+    schema, ros_definition = types.schema(topic), types.ros_definition(topic)
+    result_schema = schema
+    if ros_definition.encoding == ROS1MSG and target_format != PROTOBUF:
+        result_schema, ros_definition = ros2_types.find(topic, schema)
+    result = _result(topic, target_format, result_schema, ros_definition)
+    return TopicRoute(topic, Fate.CONVERTED, result, schema, result_schema)
 
 
 def _result(topic: Topic, target_format: str, schema: Schema, ros_definition: RecordedDefinition) -> Topic:

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 from urllib.parse import quote
 
 from rosidl_adapter_proto.bags.model import (
@@ -34,6 +34,8 @@ from rosidl_adapter_proto.transcode.records import pack_records
 
 CHUNK_SIZE = 2**20
 """About how many bytes of messages make a chunk."""
+
+_Row: TypeAlias = tuple[Any, ...]  # a row of messages: id, topic_id, timestamp and data, of whatever type
 
 MAXIMUM_TOPIC_ID = 2**16 - 1
 _ROW_SIZE = 64  # bytes of a row beside its message, about
@@ -89,7 +91,7 @@ class SqliteReader:
         except BagError:
             if not self._salvage:
                 raise
-            groups = [(row[1], 1, row[2], row[2]) for row in self._messages(EVERYTHING)]
+            groups = [(row[1], 1, row[2], row[2]) for rows in self._batches(EVERYTHING) for row in rows]
         counts = dict.fromkeys(self.topics, 0)
         for topic, count, _, _ in groups:
             if topic not in self._topic_ids:
@@ -110,18 +112,10 @@ class SqliteReader:
         Raises:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
-        rows: list[tuple[Any, ...]] = []
-        size = done = 0
-        for row in self._messages(selection, in_time_order):
-            rows.append(row)
-            size += _ROW_SIZE + (len(row[3]) if isinstance(row[3], bytes) else 0)
-            if size >= CHUNK_SIZE:
-                yield self._chunk(rows, done)
-                done += len(rows)
-                rows = []
-                size = 0
-        if rows:
+        done = 0
+        for rows in self._batches(selection, in_time_order):
             yield self._chunk(rows, done)
+            done += len(rows)
 
     def _open(self, path: Path, stack: ExitStack) -> sqlite3.Connection:
         if not path.is_file():
@@ -257,30 +251,40 @@ class SqliteReader:
         where = " AND ".join(conditions)
         return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
-    def _messages(self, selection: Selection, in_time_order: bool = False) -> Iterator[tuple[Any, ...]]:
+    def _batches(self, selection: Selection, in_time_order: bool = False) -> Iterator[list[_Row]]:
         """Yield the rows of a selection; in the order of the table, damaged ones are left out to salvage a file."""
         query, values = self._selecting(selection, in_time_order)
         first = _FIRST_ROW
         done = 0
         while True:
-            row = None
+            rows: list[_Row] = []
+            size = 0
             try:
                 for row in self._connection.execute(query, [first, *values]):
-                    yield row
-                    done += 1
-                return
+                    rows.append(row)
+                    size += _ROW_SIZE + (len(row[3]) if isinstance(row[3], bytes) else 0)
+                    if size >= CHUNK_SIZE:
+                        yield rows
+                        done += len(rows)
+                        first = row[0] + 1
+                        rows = []
+                        size = 0
             except _ERRORS as error:
-                first = row[0] + 1 if row else first
-                if not self._salvage or in_time_order:
-                    where = f"{self.path}: table messages, from row {first} on"
-                    raise BagError(
-                        f"{where}: {_reason(error)}; {done} messages before it were read"
-                    ) from None
                 reason = _reason(error)
-            # Python asks for the row after a good one before it gives that.
+            else:
+                reason = ""
+            if rows:
+                yield rows
+                done += len(rows)
+                first = rows[-1][0] + 1
+            if not reason:
+                return
+            if not self._salvage or in_time_order:
+                where = f"{self.path}: table messages, from row {first} on"
+                raise BagError(f"{where}: {reason}; {done} messages before it were read")
             row = self._first_row(query, first, values)
-            if row:
-                yield row
+            if row:  # Python asks for the row after a good one before it gives that
+                yield [row]
                 done += 1
                 first = row[0] + 1
                 continue
@@ -307,17 +311,15 @@ class SqliteReader:
                 unreadable = middle
         return step
 
-    def _first_row(self, query: str, first: int, values: list[int]) -> tuple[Any, ...] | None:
+    def _first_row(self, query: str, first: int, values: list[int]) -> _Row | None:
         """Return the first row from one on; None if it cannot be read, or there is none."""
         try:
-            found: tuple[Any, ...] | None = self._connection.execute(
-                f"{query} LIMIT 1", [first, *values]
-            ).fetchone()
+            found: _Row | None = self._connection.execute(f"{query} LIMIT 1", [first, *values]).fetchone()
         except _ERRORS:
             return None
         return found
 
-    def _chunk(self, rows: list[tuple[Any, ...]], done: int) -> StoredChunk:
+    def _chunk(self, rows: list[_Row], done: int) -> StoredChunk:
         where = f"{self.path}, table messages, rows {rows[0][0]} to {rows[-1][0]}"
         _, topics, times, messages = zip(*rows, strict=True)
         try:
@@ -328,7 +330,7 @@ class SqliteReader:
             raise self._wrong_row(rows, done) from None
         return StoredChunk(where, data, "", len(data), 0, min(log_times), max(log_times), len(rows))
 
-    def _wrong_row(self, rows: list[tuple[Any, ...]], done: int) -> BagError:
+    def _wrong_row(self, rows: list[_Row], done: int) -> BagError:
         for number, (row, topic, time, data) in enumerate(rows):
             reason = ""
             if topic not in self._topic_ids:

@@ -24,7 +24,7 @@ class StorageReader(Protocol):
         statistics: What the storage itself says of how much it has: for a file without a summary, counted.
         attachments: The files inside it, which are few.
         metadata: Whatever else the storage keeps, by name, such as what rosbag2 and a recorder wrote about the bag.
-        warnings: What is odd about the file, for people, such as that it has no summary.
+        warnings: What is odd about the file, for people, such as that it has no summary. Reading chunks may add to it.
     """
 
     @property
@@ -48,11 +48,15 @@ class StorageReader(Protocol):
     ) -> Iterator[StoredChunk]:
         """Yield the chunks that may have messages of a selection, in the order of the file.
 
-        With `in_time_order` they come in the order of their start times, and may still overlap. A chunk may have other
-        messages as well: `read_records` and `RecordConverter` leave them out.
+        With `in_time_order` they come in the order of their start times, and may still overlap.
+
+        A chunk may have other messages as well: `read_records` and `RecordConverter` leave them out. What is in it is
+        checked when it is decompressed and walked, by `records_of` and them: of a damaged file that is salvaged, what
+        is wrong with the inside of a chunk is for the caller to note.
 
         Raises:
-            BagError: The file is damaged; the message says where.
+            BagError: The file is damaged, and not to be salvaged; the message says where. The last that is checked is
+                how many chunks and messages there were, when all have been yielded.
         """
 
     def __enter__(self) -> StorageReader: ...

@@ -24,6 +24,7 @@ from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.recorded import (
     ENCODINGS,
     ORIGIN,
+    ROS1MSG,
     recorded_definitions,
     recorded_source,
     recorded_text,
@@ -117,7 +118,7 @@ class BagTypes:
         recorded = _recorded(topic)
         return recorded if self._definitions(topic) else ros_definition(self.schema(topic))
 
-    def all(self) -> RecordedTypes:
+    def recorded_types(self) -> RecordedTypes:
         """Return what there is to generate of the recording; protobuf messages that are no ROS types are left out.
 
         Raises:
@@ -185,9 +186,11 @@ class BagTypes:
 
     @cached_property
     def _all_definitions(self) -> Package:
-        """The definitions of all topics, without those that are not valid: that is said where they are asked for."""
+        """The definitions of ROS 2 of all topics; what is not valid is left out, and told where it is asked for."""
         found: dict[TypeName, Definition] = {}
         for topic in self._topics:
+            if _recorded(topic).encoding == ROS1MSG:  # types of ROS 1 may have the names of others in ROS 2
+                continue
             with contextlib.suppress(BagError, DefinitionError):
                 found = {**self._definitions(topic), **found}
         return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -20,17 +19,11 @@ _UNITS = ("B", "kB", "MB", "GB", "TB")
 class ProgressLine:
     """One line on the terminal, with the rate and the time that is left."""
 
-    def __init__(self) -> None:
-        self._started = time.monotonic()
+    def __init__(self, started: float) -> None:
+        self._started = started
         self._drawn = 0.0
-        self._is_terminal = sys.stderr.isatty()
 
-    @property
-    def seconds(self) -> float:
-        """How long it has taken so far."""
-        return time.monotonic() - self._started
-
-    def show_bag(self, progress: Progress) -> None:
+    def __call__(self, progress: Progress) -> None:
         """Draw how far a bag is."""
         share = progress.done / progress.total if progress.total else 1.0
         self._draw(f"{share:4.0%}", share, progress)
@@ -42,14 +35,13 @@ class ProgressLine:
 
     def _draw(self, head: str, share: float, progress: Progress | BagsProgress) -> None:
         now = time.monotonic()
-        if not self._is_terminal or now - self._drawn < _REDRAWN_AFTER:
+        if now - self._drawn < _REDRAWN_AFTER:
             return
         self._drawn = now
-        elapsed = self.seconds
+        elapsed = now - self._started
         left = f", {time_text(elapsed / share - elapsed)} left" if share else ""
-        rate = size_text(progress.done / elapsed)
-        line = f"{head}  {progress.message_count} messages, {rate}/s{left}"
-        click.echo(f"\r{line}\x1b[K", nl=False, err=True)
+        text = f"{head}  {progress.message_count} messages, {size_text(progress.done / elapsed)}/s{left}"
+        click.echo(f"\r{text}\x1b[K", nl=False, err=True)
 
     def clear(self) -> None:
         """Take the line away."""
@@ -119,12 +111,13 @@ def size_text(size: float) -> str:
     while size >= 1000 and unit < len(_UNITS) - 1:
         size /= 1000
         unit += 1
-    return f"{size:.0f} {_UNITS[unit]}" if unit == 0 or size >= 100 else f"{size:.1f} {_UNITS[unit]}"
+    digits = 0 if unit == 0 or size >= 99.95 else 1
+    return f"{size:.{digits}f} {_UNITS[unit]}"
 
 
 def time_text(seconds: float) -> str:
     """Return a duration as people read it."""
-    if seconds < 60:
+    if seconds < 59.95:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)

@@ -76,12 +76,12 @@ def source_options(command: Command) -> Command:
 def bag_source_options(command: Command) -> Command:
     """Add the options that say where definitions come from that a bag does not have."""
     setting = SETTINGS["include"]
-    names = ("--interfaces", "--include", "-I")
+    names = ("--include", "--interfaces", "-I")
     include = click.option(*names, "include", type=_PATH, multiple=True, help=setting.help)
     return include(setting_option("distro")(command))
 
 
-_TIME = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|[+-]\d\d:\d\d)")
+_TIME = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|[+-]\d\d:\d\d)?")
 
 
 def _nanoseconds(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
@@ -94,17 +94,19 @@ def _nanoseconds(context: click.Context, parameter: click.Parameter, text: str |
     try:
         if found is None:
             raise ValueError
-        seconds, fraction, zone = found.groups()
+        seconds, fraction, zone = found.groups(default="")
         date = datetime.fromisoformat(seconds + zone.replace("Z", "+00:00"))
     except ValueError:
-        example = "2026-01-02T03:04:05.678Z, or nanoseconds since 1970"
-        raise click.BadParameter(f"{text!r} is not a time with a time zone, such as {example}") from None
-    return to_nanoseconds(date) + int((fraction or "").ljust(9, "0"))
+        forms = "like 2026-05-01T12:00:00Z nor a number of nanoseconds since 1970"
+        raise click.BadParameter(f"{text!r} is neither {forms}") from None
+    if not zone:
+        raise click.BadParameter(f"{text!r} has no time zone; write {text}Z for UTC")
+    return to_nanoseconds(date) + int(fraction.ljust(9, "0"))
 
 
 def time_options(command: Command) -> Command:
     """Add the options that choose a part of a bag; they reach the command as nanoseconds since 1970, or None."""
-    help_text = "Only messages recorded {}: 2026-01-02T03:04:05.678Z, or nanoseconds since 1970."
+    help_text = "Only what was recorded {}: like 2026-05-01T12:00:00Z, or nanoseconds since 1970."
     start, end = (
         click.option(f"--{name}", metavar="TIME", callback=_nanoseconds, help=help_text.format(when))
         for name, when in (("start", "at this time or later"), ("end", "before this time"))
@@ -160,19 +162,3 @@ def _check_lock_file(options: Options) -> None:
             check_lock_file_is_used(options.numbering)
         except ValueError as error:
             raise RequestError(f"--lock-file {error}") from None
-
-
-def parse_time(value: str) -> int:
-    """Return a time that stands on the command line, in nanoseconds since 1970."""
-    if value.isascii() and value.isdigit():
-        return int(value)
-    try:
-        # Python reads Z since 3.11.
-        time = datetime.fromisoformat(value[:-1] + "+00:00" if value.endswith("Z") else value)
-    except ValueError:
-        raise click.BadParameter(
-            f"{value!r} is neither like 2026-05-01T12:00:00Z nor a number of nanoseconds since 1970"
-        ) from None
-    if time.tzinfo is None:
-        raise click.BadParameter(f"{value!r} has no time zone; write {value}Z for UTC")
-    return to_nanoseconds(time)

@@ -58,6 +58,9 @@ def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""
 
+class PooledMemory(Memory):
+    """Memory that is used again once nobody looks at it any more."""
+
 class RecordConverter:
     def __init__(self, routes: Sequence[tuple[int, str, int, Transcoder | None, int | None]]) -> None:
         """Take the routes: the topic id in the chunk, what to do, the topic id in the result, the transcoder, and the
@@ -65,7 +68,7 @@ class RecordConverter:
 
     def _convert(
         self, data: Buffer, start_time: int, end_time: int | None, /
-    ) -> tuple[Memory, int, list[tuple[int, int, int, int, TranscodeError]]]:
+    ) -> tuple[PooledMemory, int, list[tuple[int, int, int, int, TranscodeError]]]:
         """Return the new chunk, how many messages it has, and of those that failed topic id, log time, sequence number,
         index and error."""
 
@@ -93,6 +96,28 @@ class Transcoder:
         self, messages: Iterable[Buffer] | Buffer, ranges: Buffer | None, threads: int, into: Buffer | None, /
     ) -> tuple[Buffer, int, bytes, dict[int, TranscodeError]]:
         """Return the same for the other direction."""
+
+class ColumnFiller:
+    def __init__(self, transcoder: Transcoder, layout: bytes, serialization: int) -> None:
+        """Take a type, its columns as `columns.pack_layout` packs them, and the place in `columns.SERIALIZATIONS`."""
+
+    @property
+    def rows(self) -> int:
+        """How many messages the columns have."""
+
+    def append(
+        self,
+        messages: Sequence[Buffer] | Buffer,
+        ranges: Buffer | None,
+        first: int,
+        maximum_rows: int,
+        maximum_bytes: int,
+    ) -> int:
+        """Append messages from `first` on until there are so many rows or bytes; return the index of the next one."""
+
+    def take(self) -> tuple[int, list[tuple[int, Memory | None, Memory]]]:
+        """Hand the columns over and begin anew: how many rows they have, and of each how many rows it has itself, its
+        offsets and its values."""
 
 class Codec(Generic[MessageT]):
     def __init__(self, transcoder: Transcoder, message_class: type[MessageT]) -> None: ...

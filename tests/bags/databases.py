@@ -46,6 +46,12 @@ QOS = """\
     sec: 9223372036
     nsec: 854775807
   avoid_ros_namespace_conventions: false"""
+NAMED_QOS = (
+    QOS.replace("history: 3", "history: unknown")
+    .replace("reliability: 1", "reliability: reliable")
+    .replace("durability: 2", "durability: volatile")
+    .replace("liveliness: 1", "liveliness: automatic")
+)
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 
 

@@ -12,6 +12,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.model import EVERYTHING, Selection
+from rosidl_adapter_proto.transcode.error import RecordsError
 from rosidl_adapter_proto.transcode.records import read_records
 
 PATH = "a.mcap"
@@ -91,6 +92,8 @@ def messages_of(reader: McapReader, selection: Selection = EVERYTHING) -> Iterat
             records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time
         )
         for index in range(len(records)):
+            if records.topic_ids[index] not in reader.topics:
+                raise RecordsError(0, "a message of a topic that is not there")
             yield Recorded(
                 reader.topics[records.topic_ids[index]].name,
                 records.sequences[index],

@@ -83,7 +83,8 @@ def mcap_bytes(
     def channel(topic: str) -> int:
         if topic not in channels:
             name = types.get(topic, STRING)
-            schema = writer.register_schema(name, "ros2msg", definitions.get(name, "").encode())
+            encoding = "ros2msg" if name in definitions else ""
+            schema = writer.register_schema(name, encoding, definitions.get(name, "").encode())
             keys = {"offered_qos_profiles": QOS, "note": f"of {topic}"}
             if name in hashes:
                 keys["topic_type_hash"] = hashes[name]

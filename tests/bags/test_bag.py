@@ -298,7 +298,7 @@ def test_a_type_that_nobody_knows(tmp_path: Path) -> None:
 
     assert message.data == b"\0\1\0\0\1\0\0\0"
     assert error_of(lambda: message.message).startswith(
-        "topic /one: there is no definition of no_such_msgs/msg/Thing: it is not in the recording;"
+        "topic /one (no_such_msgs/msg/Thing): package 'no_such_msgs' was not found"
     )
 
     definition = tmp_path / "src" / "no_such_msgs" / "msg" / "Thing.msg"
@@ -380,7 +380,7 @@ def test_protobuf_messages_that_ros_does_not_know(tmp_path: Path) -> None:
     (message,) = open_bag(path).messages()
 
     assert message.message.seconds == 3
-    assert "which have no ROS type" in error_of(lambda: open_bag(path).schema("/one"))
+    assert "protobuf messages of no ROS type" in error_of(lambda: open_bag(path).schema("/one"))
 
 
 def test_another_serialization_format(tmp_path: Path) -> None:

@@ -48,12 +48,6 @@ def test_a_chunk_may_be_empty(compression: str) -> None:
     assert bytes(records_of(chunk)) == b""
 
 
-@pytest.mark.parametrize("compression", ["zstd", "lz4"])
-def test_a_level_is_a_number_of_the_compression(compression: str) -> None:
-    sizes = [memoryview(compress(DATA * 3, compression, level)).nbytes for level in (None, 1, 9)]
-    assert all(0 < size < len(DATA) for size in sizes)
-
-
 def test_many_threads_compress_at_once() -> None:
     with ThreadPoolExecutor(8) as pool:
         chunks = list(pool.map(lambda _: stored("zstd"), range(64)))

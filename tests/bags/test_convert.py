@@ -69,7 +69,8 @@ def check_every_type(threads: int) -> None:
         for name, definition in package.items()
         if name.namespace == "msg" and not definition.file.endswith(".idl")
     ]
-    messages, values = [], []
+    messages: list[Recorded] = []
+    values: list[dict[str, Any]] = []
     for name in names:
         schema, rng = registry[name], random.Random(name)
         for _ in range(2):

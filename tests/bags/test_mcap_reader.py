@@ -11,6 +11,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.model import Attachment, RecordedDefinition, Selection, Statistics, Topic
+from rosidl_adapter_proto.errors import BagError
 from tests.bags.mcap_files import (
     MESSAGES,
     NO_SUMMARY,
@@ -172,6 +173,9 @@ def test_several_channels_of_one_topic_are_topics_of_their_own() -> None:
 
 
 ROSBAG2 = """\
+version: 8
+storage_identifier: mcap
+relative_file_paths: []
 topics_with_message_count:
   - topic_metadata:
       name: /t
@@ -201,9 +205,7 @@ topics_with_message_count:
         ("json", ("std_msgs/msg/String", "jsonschema"), {}, "std_msgs/msg/String"),
     ],
 )
-@pytest.mark.parametrize(
-    "rosbag2", [ROSBAG2, "[1]", "{", "topics_with_message_count: [1, {topic_metadata: 2}]", None]
-)
+@pytest.mark.parametrize("rosbag2", [ROSBAG2, None])
 def test_the_type_of_a_topic(
     encoding: str,
     schema: tuple[str, str] | None,
@@ -214,8 +216,8 @@ def test_the_type_of_a_topic(
     def add(writer: Writer) -> None:
         schema_id = writer.register_schema(*schema, b"definition") if schema else 0
         writer.register_channel("/t", encoding, schema_id, metadata)
-        writer.add_metadata("rosbag2", {"serialized_metadata": "{}"})
         if rosbag2 is not None:
+            writer.add_metadata("rosbag2", {"serialized_metadata": "version: 99"})
             writer.add_metadata("rosbag2", {"serialized_metadata": rosbag2})
 
     (read,) = reader_of(mcap_file([], more=add)).topics.values()
@@ -233,3 +235,20 @@ def test_the_file_is_closed_with_its_reader() -> None:
     with McapReader(file, "a.mcap"):
         pass
     assert file.closed
+
+
+@pytest.mark.parametrize("schema", ["std_msgs/msg/String", ""])
+def test_a_description_of_rosbag2_is_needed_only_where_a_type_is_not_known(schema: str) -> None:
+    def add(writer: Writer) -> None:
+        writer.register_channel("/t", "cdr", writer.register_schema(schema, "", b""))
+        writer.add_metadata("rosbag2", {"serialized_metadata": "version: 99"})
+
+    data = mcap_file([], more=add)
+    if schema:
+        assert [topic.type_name for topic in reader_of(data).topics.values()] == [schema]
+        return
+    with pytest.raises(BagError) as caught:
+        reader_of(data)
+    assert str(caught.value) == (
+        "a.mcap, the metadata in it: version: 99 is not known (1 to 9); name a file of the bag instead of its folder"
+    )

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 
+import fsspec
 import pytest
 from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.records import Channel, Schema, SummaryOffset
@@ -14,6 +15,7 @@ from mcap.stream_reader import StreamReader
 
 import rosidl_adapter_proto
 from rosidl_adapter_proto.bags.compression import COMPRESSIONS
+from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.model import Attachment, RecordedDefinition, Statistics, Topic
 from rosidl_adapter_proto.errors import BagError
@@ -224,3 +226,14 @@ def test_what_cannot_be_written_is_refused() -> None:
     with pytest.raises(BagError) as missing:
         writer.write(writer.pack(records(MESSAGES[:1], {"/a": 4})))
     assert str(missing.value) == "b.mcap: there are messages of topic id 4, which was not added"
+
+
+def test_files_that_are_somewhere_else() -> None:
+    """Files of fsspec can only be written from the front to the end."""
+    memory = fsspec.filesystem("memory")
+    with McapWriter(memory.open("/b.mcap", "wb"), "memory://b.mcap", profile="ros2") as writer:
+        topic_ids = {topic.name: writer.add_topic(topic) for topic in (CDR, PROTOBUF)}
+        writer.write(writer.pack(records(MESSAGES, topic_ids)))
+        writer.finish()
+    with McapReader(memory.open("/b.mcap", "rb"), "memory://b.mcap") as reader:
+        assert tuple(messages_of(reader)) == MESSAGES

@@ -20,15 +20,8 @@ from rosidl_adapter_proto.bags.model import Topic
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.bags.yaml_text import MAXIMUM_NODE_COUNT, read_yaml
 from rosidl_adapter_proto.errors import BagError
-from tests.bags.databases import QOS, database
+from tests.bags.databases import NAMED_QOS, QOS, database
 from tests.bags.databases import STRING_HASH as HASH
-
-NAMED_QOS = (
-    QOS.replace("history: 3", "history: unknown")
-    .replace("reliability: 1", "reliability: reliable")
-    .replace("durability: 2", "durability: volatile")
-    .replace("liveliness: 1", "liveliness: automatic")
-)
 
 
 def text_of(version: int) -> str:
@@ -304,7 +297,7 @@ def test_what_is_wrong_is_said_with_its_place(name: str) -> None:
     ("data", "expected"),
     [
         (b"a: \xff", "not UTF-8 at byte 3"),
-        (bytes(16 * 2**20 + 1), "16777217 bytes are too large for metadata of a bag (at most 16777216)"),
+        (bytes(16 * 2**20 + 1), "too large for metadata of a bag: more than 16777216 bytes"),
         (
             b"a: \0",
             "not valid YAML: unacceptable character #x0000: control characters are not allowed "

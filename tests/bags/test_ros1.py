@@ -231,6 +231,10 @@ WRONG = {
         BAG[:5000],
         "cut off: its index should be at byte %d, but it has 5000 bytes",
     ),
+    "a record without a kind": (
+        BAG[:13] + _u32(0) + _u32(0),
+        "at byte 13: damaged: a record that does not say what it is",
+    ),
     "no header": (BAG[:13] + _record(4), "at byte 13: damaged: the header of the bag is missing"),
     "cut off in the header": (BAG[:20], "at byte 13: cut off: at least 70 bytes of a record are missing"),
     "an enormous header": (
@@ -338,6 +342,8 @@ def test_damaged_bags_raise_nothing_else(
     for place, value in changes:
         content[place % len(content)] = value
     try:
-        _read(bytes(content[:cut]), salvage)
+        rows, statistics, warnings = _read(bytes(content[:cut]), salvage)
     except BagError as error:
         assert str(error).startswith("a.bag")
+    else:
+        assert len(rows) == statistics.message_count or UNFINISHED not in warnings

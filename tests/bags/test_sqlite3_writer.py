@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from array import array
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,25 @@ def test_what_is_written_is_what_rosbag2_writes(tmp_path: Path) -> None:
         assert reader.topics[1] == STRING
         assert reader.statistics == statistics
         assert reader.metadata == [("rosbag2", {"serialized_metadata": "version: 8\n"})]
+
+
+def test_rosbags_reads_what_is_written(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Reader
+
+    from rosidl_adapter_proto.bags.metadata import BagMetadata, TopicInformation, write_metadata
+
+    topics = {1: STRING, 2: replace(STRING, name="/b")}
+    _write(tmp_path / "a.db3", topics, ROWS)
+    information = tuple(
+        TopicInformation(topic, count) for topic, count in zip(topics.values(), (27, 13), strict=True)
+    )
+    metadata = BagMetadata("sqlite3", ("a.db3",), information, message_count=40)
+    (tmp_path / "metadata.yaml").write_text(write_metadata(metadata))
+    with Reader(tmp_path) as oracle:
+        rows = [Row(connection.topic, time, bytes(data)) for connection, time, data in oracle.messages()]
+        assert rows == sorted(ROWS, key=lambda row: row.time)
+        assert oracle.connections[0].msgdef.data == "string data\n"
+        assert oracle.connections[0].digest == STRING_HASH
 
 
 def test_protobuf_topics_keep_descriptors_and_definitions(tmp_path: Path) -> None:

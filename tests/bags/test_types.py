@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from google.protobuf import timestamp_pb2
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -97,7 +98,7 @@ def test_each_topic_has_its_own_version() -> None:
         old_point.x = 1.5
     assert bag.warnings == []
     with pytest.raises(BagError) as caught:
-        bag.all()
+        bag.recorded_types()
     assert str(caught.value) == (
         "my_msgs/msg/Point is not the same in topics /old and /new: code can only have one version"
     )
@@ -195,6 +196,11 @@ def test_definition_of_another_topic() -> None:
             "my_msgs/msg/Track:1:7)",
         ),
         (
+            "".join(f"T{n + 1} t\n{RULE}\nMSG: my_msgs/T{n + 1}\n" for n in range(200)) + "int8 a\n",
+            f"{TOPIC}my_msgs/msg/T100.t (definition of topic /track: MSG my_msgs/msg/T100:1:6) nests messages more "
+            "than 100 deep, which protobuf does not read; flatten my_msgs/msg/T101 or what is in it",
+        ),
+        (
             "float64[99999999999] x\n",
             f"{TOPIC}my_msgs/msg/Track.x (definition of topic /track: MSG my_msgs/msg/Track:1:22): the length of an "
             "array must be at most 4294967295, since ROS sends no more, not 99999999999",
@@ -235,7 +241,7 @@ def test_service_events() -> None:
     assert transcoder.cdr_to_proto(transcoder.proto_to_cdr(data)) == data or message.request[0].a == 5  # type: ignore[attr-defined]
     known = topic(type_name="my_msgs/srv/Find_Event", definition=event.definition, type_hash=schema.type_hash)
     assert types(known, distro="jazzy").schema(known).type_hash == schema.type_hash
-    found = types(event, distro="jazzy").all()
+    found = types(event, distro="jazzy").recorded_types()
     assert found.types == tuple(found.definitions) == (TypeName("my_msgs", "srv", "Find"),)
 
 
@@ -362,7 +368,27 @@ def test_protobuf_messages_of_others_are_read() -> None:
             "topic /cloud (foxglove.PointCloud): its messages are protobuf messages of no ROS type: they can be read, "
             "but not converted"
         )
-        assert types(recorded).all() == ({}, ())
+        assert types(recorded).recorded_types() == ({}, ())
+
+
+def test_messages_with_maps_and_well_known_types() -> None:
+    file = FileDescriptorProto(
+        name="a.proto", package="a", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
+    )
+    message = file.message_type.add(name="A")
+    entry = message.nested_type.add(name="TimesEntry")
+    entry.options.map_entry = True
+    single, many = FieldDescriptorProto.LABEL_OPTIONAL, FieldDescriptorProto.LABEL_REPEATED
+    text, nested = FieldDescriptorProto.TYPE_STRING, FieldDescriptorProto.TYPE_MESSAGE
+    entry.field.add(name="key", number=1, label=single, type=text)
+    entry.field.add(name="value", number=2, label=single, type=nested, type_name=".google.protobuf.Timestamp")
+    message.field.add(name="times", number=1, label=many, type=nested, type_name=".a.A.TimesEntry")
+    message.field.add(name="inner", number=2, label=single, type=nested, type_name=".a.A")
+    timestamp = FileDescriptorProto.FromString(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    recorded = cloud(file, timestamp, name="a.A")
+    read: Any = types(recorded).message_class(recorded)()
+    read.inner.times["x"].FromJsonString("1970-01-01T00:00:05Z")
+    assert read.inner.times["x"].seconds == 5
 
 
 def changed(file: FileDescriptorProto, **values: Any) -> FileDescriptorProto:
@@ -453,6 +479,21 @@ def test_ros1() -> None:
     converted = in_protobuf(recorded, bag)
     assert converted.ros_definition == recorded.definition
     assert types(converted).schema(converted).message_class is schema.message_class
-    # What ROS 2 has of the header has the same numbers.
-    header = types().schema(topic(type_name="std_msgs/msg/Header")).message_class
+    # What ROS 2 has of the header has the same numbers, and is not mistaken for that of ROS 1.
+    header = types(recorded).schema(topic(type_name="std_msgs/msg/Header")).message_class
+    assert "seq" not in header.DESCRIPTOR.fields_by_name
     assert header.FromString(message.header.SerializeToString()).stamp.sec == 7  # type: ignore[attr-defined]
+
+
+def test_rosbags_reads_the_definitions() -> None:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = Catalog((store_source("jazzy"),))
+    registry = TypeRegistry(store)
+    for name in registry:
+        text = ros_definition(registry[name]).data.decode()
+        if "char" in text.split() or "char[" in text:  # rosbags takes it for another type
+            continue
+        typestore = get_typestore(Stores.EMPTY)
+        typestore.register(get_types_from_msg(text, name))
+        assert typestore.hash_rihs01(name) == registry[name].type_hash, name

@@ -102,7 +102,7 @@ def test_definitions_that_are_elsewhere(folder: Path, my_msgs: Path, run: Run) -
     ended = run("bag", "info", "bag.mcap")
     assert ended.code == 0
     assert ended.out.endswith("/a     my_msgs/msg/A  cdr            1        nowhere\n")
-    assert ended.err.startswith("Warning: topic /a: there is no definition of my_msgs/msg/A")
+    assert ended.err.startswith("Warning: topic /a (my_msgs/msg/A): package 'my_msgs' was not found")
 
     for option in ("--interfaces", "--include", "-I"):
         assert run("bag", "info", "bag.mcap", option, "src").out.endswith(

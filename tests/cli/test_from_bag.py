@@ -20,16 +20,16 @@ SHAPES = {"msg/Track.msg": TRACK, "msg/Point.msg": POINT, "msg/Unused.msg": "boo
 RECORDED = f"{TRACK}\n{RULE}\nMSG: my_msgs/Point\n{POINT}"
 
 
-def record(path: Path, *topics: tuple[str, str, str], messages: int = 1) -> Path:
+def record(path: Path, *topics: tuple[str, str, str], messages: int = 1, encoding: str = "ros2msg") -> Path:
     """Write a recording of topics with their types and the text of these."""
     from mcap.writer import Writer
 
     with path.open("wb") as file:
         writer = Writer(file)
-        writer.start("ros2")
+        writer.start(encoding.removesuffix("msg"))
         for name, type_name, text in topics:
-            schema = writer.register_schema(type_name, "ros2msg" if text else "", text.encode())
-            channel = writer.register_channel(name, "cdr", schema)
+            schema = writer.register_schema(type_name, encoding if text else "", text.encode())
+            channel = writer.register_channel(name, "cdr" if encoding == "ros2msg" else "ros1", schema)
             for time in range(messages):
                 writer.add_message(channel, time, b"\0\1\0\0", time)
         writer.finish()  # type: ignore[no-untyped-call]
@@ -58,7 +58,7 @@ def test_every_type_of_ros_is_the_installed_one(
     folder: Path, run: Run, ros_prefix: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(ros_prefix))
-    registry = TypeRegistry()
+    registry = TypeRegistry(events=True)  # apart from generated code of other tests
     names = [each for each in registry if each.startswith(("sensor_msgs/msg/", "std_srvs/srv/"))]
     assert len(names) > 25
     texts = {each: ros_definition(registry[each]).data.decode() for each in names}
@@ -73,6 +73,19 @@ def test_every_type_of_ros_is_the_installed_one(
 
     assert ended.code == 0
     assert generated(folder / "recorded").items() >= generated(folder / "installed").items()
+
+
+def test_ros1(folder: Path, run: Run) -> None:
+    text = (
+        f"Header header\nlower_msgs/thing Thing\nstring None=it's # all\n{RULE}\nMSG: std_msgs/Header\nuint32 seq\n"
+        f"time stamp\nstring frame_id\n{RULE}\nMSG: lower_msgs/thing\nbyte camelCase\n"
+    )
+    record(folder / "a.mcap", ("/track", "My_Pkg/Track", text), encoding="ros1msg")
+    assert run("generate", "--from-bag", "a.mcap").code == 0
+    proto = folder / "generated/proto"
+    assert 'None = "it\'s # all"' in (proto / "My_Pkg/msg/Track.proto").read_text()
+    assert "int32 camelCase" in (proto / "lower_msgs/msg/thing.proto").read_text()
+    assert "fixed32 seq" in (proto / "std_msgs/msg/Header.proto").read_text()
 
 
 def test_what_is_asked_for_with_the_definitions_of_a_recording(folder: Path, run: Run) -> None:
@@ -142,8 +155,8 @@ def test_topics_without_messages_need_no_definition(folder: Path, run: Run) -> N
     assert (ended.code, ended.err) == (
         3,
         "Error: topic /lost (qualia/msg/A): package 'qualia' was not found; looked in the recording, embedded store "
-        "jazzy (messages only); give the folder of its package with --include FOLDER, or the distribution it is from with "
-        "--distro\n",
+        "jazzy (messages only); give the folder of its package with --include FOLDER, or the distribution it is from "
+        "with --distro\n",
     )
 
 

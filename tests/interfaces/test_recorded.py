@@ -136,10 +136,13 @@ module my_msgs {{ module msg {{ struct Track {{ sequence<my_msgs::msg::Point> po
 {RULE}
 IDL: my_msgs/msg/Point
 {IDL_POINT}"""
+POINT_IN_MSG = f"{RULE}\nMSG: my_msgs/Point\nfloat64 x\nfloat64 y\n"
+MIXED = IDL_TRACK.replace(f"{RULE}\nIDL: my_msgs/msg/Point\n{IDL_POINT}", POINT_IN_MSG)
 
 
 def test_idl_in_any_order_and_beside_msg() -> None:
-    expected = hash_of(f"Point[] points\n{RULE}\nMSG: my_msgs/Point\nfloat64 x\nfloat64 y\n")
+    expected = hash_of(f"Point[] points\n{POINT_IN_MSG}")
+    assert POINT_IN_MSG in MIXED
     own, point = IDL_TRACK.split("\n\n")
     assert hash_of(IDL_TRACK, encoding="ros2idl") == expected
     assert hash_of(f"{point}\n{own}\n", encoding="ros2idl") == expected
@@ -385,6 +388,21 @@ def test_every_installed_idl_has_its_hash(ros_prefix: object) -> None:
         ), path
 
 
+@pytest.mark.parametrize("suffix", [".srv", ".action"])
+def test_every_part_of_services_and_actions_has_its_hash(suffix: str, ros_prefix: object) -> None:
+    installed = Catalog(tuple(prefix_sources()))
+    paths = [each for each in oracle.installed_definitions(suffix) if each.with_suffix(".json").exists()]
+    assert paths
+    for path in paths:
+        needed = type_closure(installed, oracle.type_name(path))
+        _, text = recorded_text({each: installed.definition(each) for each in reversed(needed)})
+        described = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["type_hashes"]
+        own = f"{path.parts[-3]}/{path.parts[-2]}/{path.stem}"
+        for each in described:
+            if each["type_name"].startswith(own):
+                assert hash_of(text.decode(), each["type_name"]) == each["hash_string"]
+
+
 @pytest.mark.parametrize("distribution", ["humble", "noetic"])
 def test_every_message_as_rosbags_writes_it(distribution: str) -> None:
     from rosbags.typesys import Stores, get_typestore
@@ -405,6 +423,7 @@ def test_every_message_as_rosbags_writes_it(distribution: str) -> None:
         (TRACK, "my_msgs/msg/Track", "ros2msg"),
         (ROS1, "my_msgs/msg/Track", "ros1msg"),
         (IDL_TRACK, "my_msgs/msg/Track", "ros2idl"),
+        (MIXED, "my_msgs/msg/Track", "ros2idl"),
         ("int8 a\n---\nint8 b\n", "my_msgs/srv/Find", "ros2msg"),
     ],
 )

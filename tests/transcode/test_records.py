@@ -5,10 +5,11 @@ from __future__ import annotations
 import array
 import functools
 import io
+import mmap
 import pickle
 import random
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -107,7 +108,9 @@ def test_what_is_packed_is_read(messages: list[Message]) -> None:
     assert chunk == chunk_of(messages)
     records = read_records(chunk)
     assert messages_of(records) == messages
-    assert (len(records), records.others, records.data) == (len(messages), (), chunk)
+    assert len(records) == len(messages)
+    assert bytes(records.data) == chunk
+    assert not records.others
     assert [each.format for each in (records.topic_ids, records.sequences, records.ranges)] == ["H", "I", "Q"]
 
 
@@ -147,7 +150,7 @@ def mcap_file(messages: Sequence[Message]) -> bytes:
     from mcap.writer import CompressionType, IndexType, Writer
 
     file = io.BytesIO()
-    writer = Writer(file, 2**32, CompressionType.NONE, index_types=IndexType.ALL)
+    writer: Any = Writer(file, 2**32, CompressionType.NONE, index_types=IndexType.ALL)
     writer.start()
     for topic_id in range(1, max((each[0] for each in messages), default=0) + 1):
         writer.register_channel(f"/{topic_id}", "cdr", 0)
@@ -209,6 +212,15 @@ def test_every_topic_id() -> None:
     assert read_records(converted.data).topic_ids.tolist() == [65535 - each for each in ids]
 
 
+def test_a_chunk_that_is_too_large() -> None:
+    # Of this memory nothing is touched.
+    with mmap.mmap(-1, 2**32) as zeros, pytest.raises(RecordsError) as caught:
+        index_records(zeros)
+    assert str(caught.value) == (
+        f"byte 0 of the chunk: the chunk has {2**32} bytes and may have {LARGEST}; make smaller chunks"
+    )
+
+
 def test_an_empty_chunk() -> None:
     assert messages_of(read_records(b"")) == []
     index = index_records(b"")
@@ -232,19 +244,13 @@ def test_what_cannot_be_packed() -> None:
     with pytest.raises(TypeError, match="`log_times` must be a contiguous buffer of 64-bit numbers"):
         pack_records(ids, sequences, array.array("d", [1]), times, [b""])
     with pytest.raises(TypeError, match="messages must be a sequence of buffers"):
-        pack_records(ids, sequences, times, times, 5)
+        pack_records(ids, sequences, times, times, 5)  # type: ignore[arg-type]
     with pytest.raises(TypeError):
-        pack_records(ids, sequences, times, times, ["text"])
+        pack_records(ids, sequences, times, times, ["text"])  # type: ignore[list-item]
     # Of numpy as well; and nothing larger than a chunk may be, before memory is taken.
-    count = 4096
+    columns: list[Any] = [numpy.zeros(4096, f"uint{bits}") for bits in (16, 32, 64, 64)]
     with pytest.raises(RecordsError) as caught:
-        pack_records(
-            numpy.zeros(count, numpy.uint16),
-            numpy.zeros(count, numpy.uint32),
-            numpy.zeros(count, numpy.uint64),
-            numpy.zeros(count, numpy.uint64),
-            [bytes(2**20)] * count,
-        )
+        pack_records(columns[0], columns[1], columns[2], columns[3], [bytes(2**20)] * 4096)
     assert str(caught.value) == (
         f"byte {4095 * (2**20 + 31)} of the chunk: with this message the result would have more than {LARGEST} bytes;"
         " make smaller chunks"
@@ -378,6 +384,20 @@ def test_threads() -> None:
         assert [bytes(each.data) for each in pool.map(converter.convert, chunks)] == expected
 
 
+def test_memory_is_used_again_when_nobody_looks_at_it() -> None:
+    converter = RecordConverter({1: Route(1)})
+    chunks = [simple_chunk((1, bytes([i]) * (100_000 >> i % 5))) for i in range(40)]
+    for _ in range(2):
+        results = [converter.convert(each).data for each in chunks]
+        assert results == chunks
+        kept = results[7][-9:]
+        del results
+        assert converter.convert(chunks[1]).data == chunks[1]
+        with pytest.raises(RecordsError):
+            converter.convert(chunks[2] + b"\5")
+        assert bytes(kept) == bytes([7]) * 9
+
+
 def test_results_outlive_their_converter() -> None:
     converted = RecordConverter({1: Route(1)}).convert(simple_chunk((1, b"abc")))
     part = converted.data[-3:]
@@ -385,17 +405,18 @@ def test_results_outlive_their_converter() -> None:
     assert bytes(part) == b"abc"
 
 
+def test_the_topic_of_what_fails_is_a_number_of_16_bits() -> None:
+    with pytest.raises(ValueError, match="65536 is no topic id; give a number from 0 to 65535"):
+        RecordConverter({1: Route(1, strings(), failed_topic_id=65536)})
+
+
 @pytest.mark.parametrize("topic_id", [-1, 65536, 1.5, "1", None])
 def test_topic_ids_are_numbers_of_16_bits(topic_id: Any) -> None:
     text = f"{topic_id!r} is no topic id; give a number from 0 to 65535"
-    for routes in (
-        {topic_id: Route(1)},
-        {1: Route(topic_id)},
-        {1: Route(1, strings(), failed_topic_id="x" if topic_id is None else topic_id)},
-    ):
+    for routes in ({topic_id: Route(1)}, {1: Route(topic_id)}):
         with pytest.raises(ValueError) as caught:
             RecordConverter(routes)
-        assert str(caught.value) in (text, text.replace("None", "'x'"))
+        assert str(caught.value) == text
     with pytest.raises(ValueError, match="is no topic id"):
         read_records(b"", [topic_id])
 
@@ -426,7 +447,7 @@ DAMAGED = {
 @pytest.mark.parametrize("name", DAMAGED)
 def test_errors(name: str) -> None:
     data, reason = DAMAGED[name]
-    calls = [RecordConverter({1: Route(1, failed_topic_id=3)}).convert]
+    calls: list[Callable[[bytes], object]] = [RecordConverter({1: Route(1, failed_topic_id=3)}).convert]
     if name != "no route":
         calls += [read_records, index_records]
     for call in calls:

@@ -11,6 +11,7 @@ import numpy
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from reference_cdr import write_ros1
 from ros_types import (
     NUMBER_FORMATS,
     Types,
@@ -108,6 +109,20 @@ def test_what_rosbags_writes_is_read(name: str) -> None:
                 transcode.ros1_to_proto(ros1[:-1])
         with pytest.raises(TranscodeError, match="1 bytes follow the last field"):
             transcode.ros1_to_proto(ros1 + b"\0")
+
+
+@pytest.mark.parametrize("name", nasty_types())
+def test_every_kind_of_field(name: str) -> None:
+    types = nasty_types()
+    transcode, message_class = transcoder(types, name)
+    rng = random.Random(name)
+    for _ in range(50):
+        value = random_value(types, name, rng)
+        ros1 = write_ros1(types, name, value)
+        proto = message_class.FromString(transcode.ros1_to_proto(ros1))
+        assert same_message(proto, protobuf_message(types, name, value, message_class()))
+        part, _ = transcoder(types, name, fields=[types[name]["fields"][-1]["name"]])
+        assert len(part.ros1_to_proto(ros1)) <= len(proto.SerializeToString())
 
 
 def error(types: Types, name: str, data: bytes) -> str:

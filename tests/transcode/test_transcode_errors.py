@@ -148,13 +148,13 @@ FROM_CDR = {
     "lone surrogate": (
         "Characters",
         cdr("IIHH", 0, 2, 65, 0xD800),
-        ".wide_chars[1] at byte 14: half of a surrogate pair stands alone, which text in protobuf cannot hold;"
+        ".wide_chars[1] at byte 14: half of a surrogate pair stands alone, which text cannot hold;"
         " send both halves",
     ),
     "swapped surrogates": (
         "Characters",
         cdr("IIHHH", 0, 3, 65, 0xDC00, 0xD800),
-        ".wide_chars[1] at byte 14: half of a surrogate pair stands alone, which text in protobuf cannot hold;"
+        ".wide_chars[1] at byte 14: half of a surrogate pair stands alone, which text cannot hold;"
         " send both halves",
     ),
     "wide too long": (

@@ -43,6 +43,7 @@ enum class Reason : uint8_t {
   TooLarge,
   OutOfMemory,
   Partial,
+  ColumnsFull,
   Changed,
 };
 constexpr int64_t kNoElement = -1;

@@ -50,6 +50,8 @@ struct Operation {
   WireType wire_type;  // of one element
   bool packable;       // a repeated number, which comes packed or not
   uint8_t tag_size;    // 1 to 5
+  bool filler;         // what ROS 2 has in an empty message, and ROS 1 has not
+  bool other_sign;     // a number with a sign in ROS 2 or in ROS 1, but not in both
   uint64_t tag;        // as written: the first `tag_size` bytes, then zeros
   uint64_t tag_mask;   // 0xff for each byte of the tag
   uint32_t next;       // index of the operation with the next higher field number in the same message
@@ -58,8 +60,6 @@ struct Operation {
   uint32_t string_bound;  // in characters
   uint32_t message;       // index of the nested message
   uint32_t number;        // field number
-  bool filler;            // what ROS 2 has in an empty message, and ROS 1 has not
-  bool other_sign;        // a number with a sign in ROS 2 or in ROS 1, but not in both
   uint32_t place[8];  // of a message of fixed size: where the field begins, for each start offset modulo 8
   Name name, protobuf_name;
 };

@@ -7,11 +7,11 @@
 
 #include <array>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "memory.hpp"
 #include "transcode.hpp"
 #include "wire.hpp"
 
@@ -33,6 +33,7 @@ enum class RecordsReason : uint8_t {
   ShortMessage,
   NoRoute,
   TooLarge,
+  ChunkTooLarge,
   OutOfMemory,
 };
 
@@ -147,35 +148,6 @@ class ByTopic {
   static constexpr unsigned kPage = 256;
   using Page = std::array<T, kPage>;
   std::array<std::unique_ptr<Page>, 0x10000 / kPage> pages_;
-};
-
-// Memory that grows. It is not filled with zeros, since all that counts is written.
-class Memory {
- public:
-  Memory() = default;
-  Memory(Memory&& other) noexcept : data_(other.data_), size_(other.size_), capacity_(other.capacity_) {
-    other.data_ = nullptr;
-    other.size_ = other.capacity_ = 0;
-  }
-  Memory& operator=(Memory&&) = delete;
-  ~Memory() { std::free(data_); }
-
-  const uint8_t* data() const { return data_; }
-  uint64_t size() const { return size_; }
-
-  // Makes room for `more` bytes behind what there is, and returns their place; nullptr if there is no memory.
-  uint8_t* reserve(uint64_t more) {
-    if (more > capacity_ - size_ && !grow(more)) return nullptr;
-    return data_ + size_;
-  }
-  // So many of the bytes that there is room for are written.
-  void add(uint64_t written) { size_ += written; }
-
- private:
-  bool grow(uint64_t more);
-
-  uint8_t* data_ = nullptr;
-  uint64_t size_ = 0, capacity_ = 0;
 };
 
 // The index of a chunk: one MessageIndex record for each topic, in the order of their ids.

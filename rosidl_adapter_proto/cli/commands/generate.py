@@ -114,7 +114,7 @@ def _recorded(bags: Sequence[str], include: Iterable[Path], distro: str | None) 
         counts = reader.statistics.message_counts
         topics += (each for id, each in reader.topics.items() if counts.get(id) or each.definition.encoding)
     types = BagTypes(topics, include, distro)
-    recorded = types.all()
+    recorded = types.recorded_types()
     for warning in types.warnings:
         click.echo(f"Warning: {warning}", err=True)
     if not recorded.types:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, TextIO
@@ -9,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from rosidl_adapter_proto.cli.conversion_report import ProgressLine, show_outcome, show_outcomes, show_result
-from rosidl_adapter_proto.cli.options import parse_time, plugin_option, source_options
+from rosidl_adapter_proto.cli.options import bag_source_options, plugin_option, time_options
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.many import BagOutcome, BagTask
@@ -64,16 +66,7 @@ EXIT_SOME_FAILED = 3
     metavar="NAME",
     help="Leave out this topic, or those that fit a pattern. May be repeated.",
 )
-@click.option(
-    "--start",
-    type=parse_time,
-    default="0",
-    metavar="TIME",
-    help="Convert only what was recorded at this time or later.",
-)
-@click.option(
-    "--end", type=parse_time, metavar="TIME", help="Convert only what was recorded before this time."
-)
+@time_options
 @click.option(
     "--on-error",
     type=click.Choice(["stop", "skip", "copy"]),
@@ -111,7 +104,7 @@ EXIT_SOME_FAILED = 3
     help="How often to try a file again after a process was killed or a connection broke.",
 )
 @plugin_option
-@source_options
+@bag_source_options
 def command(
     places: tuple[str, ...],
     listed: TextIO | None,
@@ -124,8 +117,7 @@ def command(
 
     IN is a folder that rosbag2 has recorded, a file of one, or a ROS 1 bag. OUT must not exist: it becomes such a
     folder, or a single file if its name ends in .mcap or .db3. Both may be URLs that fsspec knows, such as
-    s3://bucket/drive-12. Times are in ISO 8601 with a time zone, such as 2026-05-01T12:00:00Z, or in nanoseconds since
-    1970.
+    s3://bucket/drive-12.
 
     With several IN, a --list or a pattern such as 'bags/*', OUT is the folder that gets a bag for each, with its name.
     A bag that is there already is not converted again, so the same command goes on where another has ended.
@@ -164,12 +156,14 @@ def _workers(
 def _convert_bag(source: str, destination: str, options: Mapping[str, Any], workers: Workers) -> int:
     from rosidl_adapter_proto.bags.convert import convert_bag
 
-    progress = ProgressLine()
+    started = time.monotonic()
+    line = ProgressLine(started)
+    progress = line if sys.stderr.isatty() else None
     try:
-        result = convert_bag(source, destination, workers=workers, progress=progress.show_bag, **options)
+        result = convert_bag(source, destination, workers=workers, progress=progress, **options)
     finally:
-        progress.clear()
-    show_result(destination, result, progress.seconds)
+        line.clear()
+    show_result(destination, result, time.monotonic() - started)
     return 0 if result.is_complete else EXIT_INCOMPLETE
 
 
@@ -177,19 +171,21 @@ def _convert_bags(tasks: Sequence[BagTask], options: Mapping[str, Any], workers:
     from rosidl_adapter_proto.bags.convert import settings_of
     from rosidl_adapter_proto.bags.many import convert_bags
 
-    progress = ProgressLine()
+    started = time.monotonic()
+    line = ProgressLine(started)
+    progress = line.show_bags if sys.stderr.isatty() else None
 
     def finished(outcome: BagOutcome) -> None:
-        progress.clear()
+        line.clear()
         show_outcome(outcome)
 
     try:
         outcomes = convert_bags(
-            tasks, settings_of(**options), workers=workers, progress=progress.show_bags, finished=finished
+            tasks, settings_of(**options), workers=workers, progress=progress, finished=finished
         )
     finally:
-        progress.clear()
-    show_outcomes(outcomes, progress.seconds)
+        line.clear()
+    show_outcomes(outcomes, time.monotonic() - started)
     if any(outcome.error for outcome in outcomes):
         return EXIT_SOME_FAILED
     return EXIT_INCOMPLETE if any(outcome.is_incomplete for outcome in outcomes) else 0

@@ -1,0 +1,51 @@
+"""`rosidl-proto bag table`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+from rosidl_adapter_proto.errors import RequestError
+
+
+@click.command("table")
+@click.argument("bag", type=click.Path())
+@click.argument("topic")
+@click.option("--output", "-o", required=True, type=click.Path(), metavar="FILE", help="The table.")
+@click.option(
+    "--format",
+    "file_format",
+    type=click.Choice(["parquet", "arrow", "csv"]),
+    help="What to write, where the suffix of FILE does not say.",
+)
+@click.option("--fields", metavar="A.B,C", help="Only these fields of the messages.")
+@time_options
+@bag_source_options
+def command(
+    bag: str,
+    topic: str,
+    output: str,
+    file_format: str | None,
+    fields: str | None,
+    start: int | None,
+    end: int | None,
+    include: tuple[Path, ...],
+    distro: str | None,
+) -> None:
+    """Write the messages of a TOPIC in BAG as a table, with a row for each and its fields as columns.
+
+    The suffix of FILE says what is written: .parquet, .arrow or .feather, or .csv. Nested messages and lists stay what
+    they are; in CSV, each field of a nested message is a column, and a list is JSON.
+    """
+    from rosidl_adapter_proto.bags.bag import open_bag
+
+    try:
+        from rosidl_adapter_proto.bags.table import write_table
+    except ImportError as error:
+        raise RequestError(str(error)) from None
+    names = None if fields is None else [name.strip() for name in fields.split(",")]
+    with open_bag(bag, include=include, distro=distro) as opened:
+        rows = write_table(opened, topic, output, file_format=file_format, fields=names, start=start, end=end)
+    click.echo(f"{output}: {rows} rows")

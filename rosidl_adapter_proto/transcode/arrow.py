@@ -1,0 +1,203 @@
+"""Serialized messages as Arrow record batches, without a message object in between.
+
+This needs pyarrow: `pip install rosidl-adapter-proto[tables]`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rosidl_adapter_proto.errors import RequestError
+from rosidl_adapter_proto.interfaces.scalars import CdrForm
+from rosidl_adapter_proto.schema.registry import Schema
+from rosidl_adapter_proto.transcode import _core
+from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE
+from rosidl_adapter_proto.transcode.columns import (
+    DURATION,
+    SERIALIZATIONS,
+    Column,
+    ColumnKind,
+    columns_of,
+    pack_layout,
+)
+from rosidl_adapter_proto.transcode.plan import build_plan
+
+try:
+    import pyarrow as pa
+except ImportError as error:
+    raise ImportError(
+        f"tables need pyarrow ({error}); pip install rosidl-adapter-proto[tables]", name="pyarrow"
+    ) from error
+
+if TYPE_CHECKING:
+    from typing_extensions import Buffer
+
+__all__ = ["MAXIMUM_BYTES", "MAXIMUM_ROWS", "ColumnReader", "pa"]
+
+MAXIMUM_ROWS = 2**17
+"""So many rows a record batch has, unless somebody asks for others."""
+
+MAXIMUM_BYTES = 64 * 2**20
+"""A record batch ends with the row with which it has so many bytes, unless somebody asks for others."""
+
+_NUMBERS = {
+    CdrForm.BOOLEAN: pa.bool_(),
+    CdrForm.UINT8: pa.uint8(),
+    CdrForm.INT8: pa.int8(),
+    CdrForm.CHAR: pa.uint8(),
+    CdrForm.UINT16: pa.uint16(),
+    CdrForm.INT16: pa.int16(),
+    CdrForm.WCHAR: pa.uint16(),
+    CdrForm.UINT32: pa.uint32(),
+    CdrForm.INT32: pa.int32(),
+    CdrForm.FLOAT: pa.float32(),
+    CdrForm.UINT64: pa.uint64(),
+    CdrForm.INT64: pa.int64(),
+    CdrForm.DOUBLE: pa.float64(),
+}
+"""What one number becomes."""
+
+
+class ColumnReader:
+    """Reads serialized messages of one type into record batches.
+
+    The fields of a message become the columns of a table, in their order: nested messages are structs, sequences are
+    lists, and `docs/tables.md` has the whole list of types. Nothing is null. What has no fields has no column.
+
+    Attributes:
+        arrow_schema: The columns.
+
+    Args:
+        schema: The type of the messages.
+        fields: Read only these, such as `header.stamp` or, of each point in a sequence, `points.x`.
+        serialization_format: How the messages are serialized: `cdr`, `protobuf` or `ros1`.
+        maximum_rows: A record batch has so many rows at most.
+        maximum_bytes: A record batch ends with the row with which it has so many bytes, or before the row with which
+            a column would have more than 2 GiB.
+
+    Raises:
+        SchemaError: The type has no such field, or becomes too many columns.
+        RequestError: The serialization format is another one.
+    """
+
+    def __init__(
+        self,
+        schema: Schema,
+        fields: Iterable[str] | None = None,
+        *,
+        serialization_format: str = "cdr",
+        maximum_rows: int = MAXIMUM_ROWS,
+        maximum_bytes: int = MAXIMUM_BYTES,
+    ) -> None:
+        if serialization_format not in SERIALIZATIONS:
+            raise RequestError(
+                f"tables are made of {', '.join(SERIALIZATIONS)} messages, not of {serialization_format!r} ones; "
+                "convert them first"
+            )
+        plan = build_plan(schema.type_description, schema.descriptor, fields=fields)
+        self._columns = columns_of(plan)
+        self._fields = [_field(each) for each in self._columns]
+        self._maximum_rows = maximum_rows
+        self._maximum_bytes = maximum_bytes
+        transcoder = _core.Transcoder(plan.pack(), plan.type_name, MAXIMUM_SIZE)
+        layout, serialization = pack_layout(self._columns), SERIALIZATIONS.index(serialization_format)
+        self._filler = _core.ColumnFiller(transcoder, layout, serialization)
+        self.arrow_schema = pa.schema([each for each in self._fields if each is not None])
+
+    def __len__(self) -> int:
+        """Return the number of rows that the next record batch has so far."""
+        return self._filler.rows
+
+    def append(
+        self, messages: Sequence[Buffer] | Buffer, *, ranges: Buffer | None = None, start: int = 0
+    ) -> int:
+        """Append messages to the next record batch, while other Python threads run, until it is full.
+
+        Args:
+            messages: The messages; with `ranges`, the one buffer that they are in.
+            ranges: Where in the buffer each message is, as `Transcoder.cdr_to_proto_batch` takes them.
+            start: The index of the first message to append.
+
+        Returns:
+            The index of the first message that was not appended, since the record batch is full; the number of
+            messages if all were.
+
+        Raises:
+            TranscodeError: A message is not valid. Those before it were appended, and `batch_index` tells which it is.
+        """
+        return self._filler.append(messages, ranges, start, self._maximum_rows, self._maximum_bytes)
+
+    def record_batch(self) -> pa.RecordBatch:
+        """Return what was appended since the last record batch."""
+        rows, columns = self._filler.take()
+        parts = iter(columns)
+        arrays = [_array(each, field, parts) for each, field in zip(self._columns, self._fields, strict=True)]
+        kept = [each for each in arrays if each is not None]
+        if not kept:
+            return pa.RecordBatch.from_struct_array(pa.StructArray.from_buffers(pa.struct([]), rows, [None]))
+        return pa.RecordBatch.from_arrays(kept, schema=self.arrow_schema)
+
+    def record_batches(
+        self, messages: Sequence[Buffer] | Buffer, *, ranges: Buffer | None = None
+    ) -> Iterator[pa.RecordBatch]:
+        """Yield record batches of all messages; arguments and errors are those of `append`."""
+        numbers: Any = messages if ranges is None else memoryview(ranges)
+        count = len(numbers) if ranges is None else len(numbers) // 2
+        start = 0
+        while start < count:
+            start = self.append(messages, ranges=ranges, start=start)
+            yield self.record_batch()
+
+
+def _field(column: Column) -> pa.Field | None:
+    """Return the field of a column; None if there is nothing in it."""
+    data_type = _data_type(column)
+    return None if data_type is None else pa.field(column.name, data_type, nullable=False)
+
+
+def _data_type(column: Column) -> pa.DataType | None:
+    if column.kind is ColumnKind.NUMBER:
+        return _NUMBERS[column.cdr]
+    if column.kind is ColumnKind.TEXT:
+        return pa.string()
+    if column.kind is ColumnKind.TIME:
+        return pa.duration("ns") if column.type_name == DURATION else pa.timestamp("ns")
+    if column.kind is ColumnKind.STRUCT:
+        fields = [field for each in column.columns if (field := _field(each)) is not None]
+        return pa.struct(fields) if fields else None
+    if column.kind is ColumnKind.NUMBERS:
+        if column.cdr is CdrForm.UINT8:
+            return pa.binary(column.length if column.is_array else -1)
+        item = pa.field("item", _NUMBERS[column.cdr], nullable=False)
+    elif (found := _field(column.columns[0])) is not None:
+        item = found
+    else:
+        return None
+    return pa.list_(item, column.length if column.is_array else -1)
+
+
+_Part = tuple[int, Any, Any]
+"""What the core has of a column: its number of rows, its offsets, and its values."""
+
+
+def _array(column: Column, field: pa.Field | None, parts: Iterator[_Part]) -> pa.Array | None:
+    """Return the array of a column, and take its parts and those of the columns inside of it."""
+    rows, offsets, values = next(parts)
+    data_type = None if field is None else field.type
+    inner: list[pa.Array | None] = []
+    if column.kind is ColumnKind.STRUCT:
+        fields = {each.name: each for each in (data_type or ())}
+        inner = [_array(each, fields.get(each.name), parts) for each in column.columns]
+    elif column.kind is ColumnKind.LIST:
+        inner = [_array(column.columns[0], data_type and data_type.value_field, parts)]
+    elif column.kind is ColumnKind.NUMBERS and column.cdr is not CdrForm.UINT8:
+        count = rows * column.length if column.is_array else memoryview(offsets).cast("I")[rows]
+        inner = [pa.Array.from_buffers(_NUMBERS[column.cdr], count, [None, pa.py_buffer(values)])]
+    if data_type is None:
+        return None
+    buffers = [None] if offsets is None else [None, pa.py_buffer(offsets)]
+    if column.kind is not ColumnKind.STRUCT and column.kind is not ColumnKind.LIST and not inner:
+        buffers.append(pa.py_buffer(values))
+    children = [each for each in inner if each is not None]
+    return pa.Array.from_buffers(data_type, rows, buffers, null_count=0, children=children or None)
