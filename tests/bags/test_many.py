@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -258,10 +257,10 @@ def killing(times: int) -> Callable[[Progress], None]:
     def kill(progress: Progress) -> None:
         nonlocal times
         if times and progress.message_count > 0:
-            times -= 1
             for process in multiprocessing.active_children():
-                assert process.pid
-                os.kill(process.pid, signal.SIGKILL)
+                times -= 1
+                process.kill()
+                process.join()
 
     return kill
 
