@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         DefinitionError,
         Error,
         GenerateError,
+        PlaceError,
         RequestError,
         SchemaError,
     )
@@ -46,6 +47,7 @@ __all__ = [
     "DefinitionError",
     "Error",
     "GenerateError",
+    "PlaceError",
     "RequestError",
     "Schema",
     "SchemaError",
