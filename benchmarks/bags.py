@@ -32,19 +32,20 @@ MEMORY = Path("/dev/shm")
 COMPRESSIONS = ("", "lz4", "zstd")
 
 
-def seconds(*calls: Callable[[], object], turns: int = TURNS) -> list[float]:
-    """Return the time that each call takes."""
+def seconds(*calls: Callable[[], object], folder: Path | None = None, turns: int = TURNS) -> list[float]:
+    """Return the time that each call takes; what it writes to a folder is removed before the next."""
     best = [float("inf")] * len(calls)
     for _ in range(turns):
         for index, call in enumerate(calls):
             start = time.perf_counter()
             call()
             best[index] = min(best[index], time.perf_counter() - start)
+            for written in folder.iterdir() if folder else ():
+                written.unlink()
     return best
 
 
 def convert(source: Path, destination: Path, threads: int | None = None) -> None:
-    destination.unlink(missing_ok=True)
     convert_bag(source, destination, target_format="protobuf", threads=threads)
 
 
@@ -53,13 +54,15 @@ def small_rows(folder: Path) -> Iterator[Row]:
     messages = list(bag_maker.record([IMU, JOINT_STATES, TF], SMALL_SECONDS))
     for compression in COMPRESSIONS:
         bag_maker.write_mcap(folder / f"small{compression}.mcap", messages, compression=compression)
-    out, other = folder / "out.mcap", folder / "other.mcap"
+    written = folder / "written"
+    out = written / "out.mcap"
 
     source = folder / "small.mcap"
     classes = {name: adapter_for(name).custom_type for name in bag_peers.COPIES}
     ours, by_hand = seconds(
         lambda: convert(source, out),
-        lambda: bag_peers.convert_by_hand(source, other, classes, BY_HAND),
+        lambda: bag_peers.convert_by_hand(source, out, classes, BY_HAND),
+        folder=written,
     )
     ratio = (len(messages) / ours) / (BY_HAND / by_hand)
     yield Row("small messages: messages a second", "rosbags + attribute copy + mcap writer", ratio, ">= 50")
@@ -70,8 +73,9 @@ def small_rows(folder: Path) -> Iterator[Row]:
             ours, chunks = seconds(
                 lambda source=source, threads=threads: convert(source, out, threads),
                 lambda source=source, compression=compression, threads=threads: bag_peers.copy_chunks(
-                    source, other, compression, threads
+                    source, out, compression, threads
                 ),
+                folder=written,
             )
             kind = f"{compression or 'not compressed'}, {threads} thread{'s' * (threads > 1)}"
             against = "the same chunks without looking into them"
@@ -81,15 +85,17 @@ def small_rows(folder: Path) -> Iterator[Row]:
 def large_rows(folder: Path) -> Iterator[Row]:
     """Yield what converting images and clouds costs."""
     messages = list(bag_maker.record([IMAGE, POINTS], LARGE_SECONDS))
-    out, other = folder / "out.mcap", folder / "other.mcap"
+    written = folder / "written"
+    out = written / "out.mcap"
     for compression in ("", "zstd"):
         source = folder / f"large{compression}.mcap"
         bag_maker.write_mcap(source, messages, compression=compression)
         ours, copy = seconds(
             lambda source=source: convert(source, out),
             lambda source=source, compression=compression: bag_peers.copy_with_library(
-                source, other, compression
+                source, out, compression
             ),
+            folder=written,
         )
         work = f"images and clouds, {compression or 'not compressed'}: times"
         yield Row(work, "copying with the mcap library", ours / copy, "<= 1.2")
@@ -100,13 +106,11 @@ def sqlite3_rows(folder: Path) -> Iterator[Row]:
     messages = bag_maker.record([IMU, JOINT_STATES, TF], SMALL_SECONDS / 10)
     bag_maker.write_folder(folder / "small", messages)
     (source,) = (folder / "small").glob("*.db3")
-    out, other = folder / "out.db3", folder / "other.db3"
-
-    def copy() -> None:
-        other.unlink(missing_ok=True)
-        bag_peers.copy_rows(source, other)
-
-    ours, rows = seconds(lambda: convert(source, out), copy)
+    written = folder / "written"
+    out = written / "out.db3"
+    ours, rows = seconds(
+        lambda: convert(source, out), lambda: bag_peers.copy_rows(source, out), folder=written
+    )
     yield Row("small messages, sqlite3: times", "copying the rows", ours / rows, "")
 
 
@@ -148,6 +152,7 @@ def main() -> None:
     """Measure, and print the table."""
     place = str(MEMORY) if MEMORY.is_dir() else None
     with tempfile.TemporaryDirectory(dir=place) as folder:
+        Path(folder, "written").mkdir()
         print(f"{'work':52} {'against':42} {'ratio':>7}  wanted")
         for rows in (small_rows, large_rows, sqlite3_rows, reading_rows):
             for row in rows(Path(folder)):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rosidl_adapter_proto.adapter.runtime import adapter_for
     from rosidl_adapter_proto.bags.bag import open_bag
+    from rosidl_adapter_proto.bags.convert import convert_bag
     from rosidl_adapter_proto.errors import (
         BagError,
         ConversionError,
@@ -54,11 +55,20 @@ __all__ = [
     "TypeRegistry",
     "adapter_for",
     "compute_proto_field_number",
+    "convert_bag",
     "open_bag",
 ]
 
 
-_MODULES = ("errors", "schema.typemap", "schema.numbering", "schema.registry", "adapter.runtime", "bags.bag")
+_MODULES = (
+    "errors",
+    "schema.typemap",
+    "schema.numbering",
+    "schema.registry",
+    "adapter.runtime",
+    "bags.bag",
+    "bags.convert",
+)
 
 
 def __getattr__(name: str) -> Any:

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cache, cached_property
-from itertools import count
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from google.protobuf.message import Message
+from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.compression import records_of
-from rosidl_adapter_proto.bags.decoding import Decode, decoder
+from rosidl_adapter_proto.bags.decoding import decoder
+from rosidl_adapter_proto.bags.message import BagMessage, MessageSource
 from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.order import Run, in_time_order
+from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.bags.types import BagTypes
-from rosidl_adapter_proto.errors import BagError, ConversionError
+from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.time import to_nanoseconds
 from rosidl_adapter_proto.transcode.error import RecordsError
@@ -29,6 +28,10 @@ from rosidl_adapter_proto.transcode.records import Records, read_records
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.time import Time
+
+
+_READ_AHEAD = 64 * 2**20
+"""So many bytes of chunks are read before somebody needs them, unless one is larger."""
 
 
 @dataclass(frozen=True)
@@ -57,83 +60,6 @@ class BagFile:
     storage: str
     topics: Mapping[int, Topic] = field(repr=False)
     statistics: Statistics = field(repr=False)
-
-
-class BagMessage:
-    """A message of a bag. It unpacks as `topic, message, log_time`.
-
-    Attributes:
-        topic: The topic that it was sent to.
-        log_time: When it was recorded, in nanoseconds since 1970.
-        publish_time: When it was sent, in nanoseconds since 1970; where the recorder did not know, `log_time`.
-        sequence: Its number among those of its sender; 0 where the recorder did not count.
-        data: The message as it was recorded, serialized.
-    """
-
-    __slots__ = ("_decode", "_message", "_number", "data", "log_time", "publish_time", "sequence", "topic")
-
-    def __init__(
-        self,
-        topic: str,
-        log_time: int,
-        publish_time: int,
-        sequence: int,
-        data: bytes,
-        decode: Callable[[BagMessage], Message],
-        number: int,
-    ) -> None:
-        self.topic = topic
-        self.log_time = log_time
-        self.publish_time = publish_time
-        self.sequence = sequence
-        self.data = data
-        self._decode = decode
-        self._number = number
-        self._message: Message | None = None
-
-    @property
-    def message(self) -> Any:
-        """The protobuf message, which is made when it is first asked for.
-
-        Raises:
-            BagError: The bytes are no valid message of the type.
-        """
-        if self._message is None:
-            self._message = self._decode(self)
-        return self._message
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter((self.topic, self.message, self.log_time))
-
-    def __repr__(self) -> str:
-        return f"<BagMessage of {self.topic}, recorded at {self.log_time}, {len(self.data)} bytes>"
-
-
-@dataclass(frozen=True)
-class _Source:
-    """Where messages come from: a topic in a file.
-
-    Attributes:
-        path: The file, for people.
-        topic: The topic.
-        decode: Makes messages of bytes.
-        numbers: Counts the messages.
-    """
-
-    path: str
-    topic: Topic
-    decode: Callable[[], Decode]
-    numbers: Iterator[int] = field(default_factory=lambda: count(1))
-
-    def message(self, recorded: BagMessage) -> Message:
-        """Return the protobuf message of a recorded one."""
-        decode = self.decode()
-        try:
-            return decode(recorded.data)
-        except ConversionError as error:
-            raise BagError(
-                f"{self.path}: message {recorded._number} of {recorded.topic}, recorded at {recorded.log_time}: {error}"
-            ) from error
 
 
 class Bag:
@@ -261,12 +187,18 @@ class Bag:
         names = frozenset(self.topics if topics is None else self._names(topics))
         chosen = None if fields is None else tuple(fields)
         if chosen is not None:
-            for name in sorted(names):
-                decoder(self.topics[name], self.types, chosen)
+            for topic in self.topics.values():
+                if topic.name in names and topic.message_count:
+                    decoder(topic, self.types, chosen)
         return self._messages(self.runs(names, start=start, end=end), chosen)
 
     def runs(
-        self, topics: Iterable[str], *, start: Time | None = None, end: Time | None = None
+        self,
+        topics: Iterable[str],
+        *,
+        start: Time | None = None,
+        end: Time | None = None,
+        threads: int = 1,
     ) -> Iterator[tuple[StorageReader, Run]]:
         """Return an iterator over the same messages as `messages`, many at a time and as they were recorded.
 
@@ -274,6 +206,8 @@ class Bag:
             topics: The names of topics.
             start: As for `messages`.
             end: As for `messages`.
+            threads: On how many threads chunks are decompressed, ahead of who takes the messages; with one, when they
+                are needed.
 
         Returns:
             For each run of messages, the open file that it is in and the run.
@@ -285,10 +219,10 @@ class Bag:
         names = frozenset(self._names(topics))
         start_time = 0 if start is None else max(to_nanoseconds(start, "time"), 0)
         end_time = None if end is None else max(to_nanoseconds(end, "time"), 0)
-        return self._runs(names, start_time, end_time)
+        return self._runs(names, start_time, end_time, threads)
 
     def _runs(
-        self, names: frozenset[str], start_time: int, end_time: int | None
+        self, names: frozenset[str], start_time: int, end_time: int | None, threads: int
     ) -> Iterator[tuple[StorageReader, Run]]:
         for index, file in enumerate(self.files):
             ids = frozenset(topic_id for topic_id, topic in file.topics.items() if topic.name in names)
@@ -298,10 +232,10 @@ class Bag:
                 continue
             self._check_open()
             with self.recording.open(index) as reader:
-                for run in self._file_runs(reader, Selection(ids, start_time, end_time)):
+                for run in self._file_runs(reader, Selection(ids, start_time, end_time), threads):
                     yield reader, run
 
-    def _file_runs(self, reader: StorageReader, selection: Selection) -> Iterator[Run]:
+    def _file_runs(self, reader: StorageReader, selection: Selection, threads: int) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:
             self._check_open()
             try:
@@ -311,33 +245,49 @@ class Bag:
             except RecordsError as error:
                 raise BagError(f"{chunk.where}: {error}") from error
 
-        return in_time_order(reader.chunks(selection, in_time_order=True), read)
+        chunks = reader.chunks(selection, in_time_order=True)
+        if threads == 1:
+            return in_time_order(chunks, read)
+        ready: dict[int, Records] = {}
+
+        def read_ahead() -> Iterator[StoredChunk]:
+            def pair(chunk: StoredChunk) -> tuple[StoredChunk, Records]:
+                return chunk, read(chunk)
+
+            for chunk, records in map_in_order(
+                pair, chunks, threads, size=lambda chunk: chunk.size, size_limit=_READ_AHEAD
+            ):
+                ready[id(chunk)] = records
+                yield chunk
+
+        return in_time_order(read_ahead(), lambda chunk: ready.pop(id(chunk)))
 
     def _messages(
         self, runs: Iterator[tuple[StorageReader, Run]], fields: Sequence[str] | None
     ) -> Iterator[BagMessage]:
-        sources: dict[tuple[str, int], _Source] = {}
+        sources: dict[str, dict[int, MessageSource]] = {}
         for reader, run in runs:
-            records = run.records
+            if reader.path not in sources:
+                sources[reader.path] = {
+                    topic_id: self._source(reader.path, topic, fields)
+                    for topic_id, topic in reader.topics.items()
+                }
+            by_topic, records = sources[reader.path], run.records
             data, ranges = records.data, records.ranges
             for i in run.indexes:
-                key = reader.path, records.topic_ids[i]
-                if key not in sources:
-                    sources[key] = self._source(reader, key[1], fields)
-                source = sources[key]
+                source = by_topic[records.topic_ids[i]]
                 yield BagMessage(
                     source.topic.name,
                     records.log_times[i],
                     records.publish_times[i],
                     records.sequences[i],
                     bytes(data[ranges[2 * i] : ranges[2 * i + 1]]),
-                    source.message,
+                    source,
                     next(source.numbers),
                 )
 
-    def _source(self, reader: StorageReader, topic_id: int, fields: Sequence[str] | None) -> _Source:
-        topic = reader.topics[topic_id]
-        return _Source(reader.path, topic, cache(lambda: decoder(topic, self.types, fields)))
+    def _source(self, path: str, topic: Topic, fields: Sequence[str] | None) -> MessageSource:
+        return MessageSource(path, topic, lambda: decoder(topic, self.types, fields))
 
     @cached_property
     def _contents(self) -> tuple[Sequence[BagFile], Sequence[str]]:
@@ -347,6 +297,12 @@ class Bag:
         for reader in self.recording.readers():
             files.append(BagFile(reader.path, reader.storage, reader.topics, reader.statistics))
             warnings.extend(reader.warnings)
+        types: dict[str, set[str]] = {}
+        for topic in (topic for file in files for topic in file.topics.values()):
+            types.setdefault(topic.name, set()).add(topic.type_name)
+        for name, several in types.items():
+            if len(several) > 1:
+                warnings.append(f"{self.path}: topic {name} has several types: {', '.join(sorted(several))}")
         return tuple(files), tuple(dict.fromkeys(warnings))
 
     @property

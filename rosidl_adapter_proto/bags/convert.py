@@ -22,6 +22,8 @@ from rosidl_adapter_proto.bags.routes import formats, selected_topics
 from rosidl_adapter_proto.bags.workers import Workers
 from rosidl_adapter_proto.converters import ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
+from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.time import to_nanoseconds
 
 if TYPE_CHECKING:
@@ -102,7 +104,10 @@ def convert_bag(
         registry=registry,
         threads=threads,
     )
-    return convert_with(find_place(source), find_place(destination), settings, workers or Workers(), progress)
+    elsewhere = find_catalog(settings.include, settings.distro)
+    return convert_with(
+        find_place(source), find_place(destination), settings, elsewhere, workers or Workers(), progress
+    )
 
 
 def settings_of(
@@ -113,6 +118,7 @@ def settings_of(
     end: Time | None = None,
     on_error: str = "stop",
     include: Iterable[Path | str] = (),
+    registry: ConverterRegistry | None = None,
     **others: Any,
 ) -> Settings:
     """Return the settings that are the arguments of `convert_bag`."""
@@ -123,6 +129,7 @@ def settings_of(
         end_time=None if end is None else to_nanoseconds(end),
         on_error=OnError(on_error),
         include=tuple(map(Path, include)),
+        registry=registry or ConverterRegistry(),
         **others,
     )
 
@@ -131,10 +138,11 @@ def convert_with(
     source: Place,
     destination: Place,
     settings: Settings,
+    elsewhere: Catalog,
     workers: Workers,
     progress: Callable[[Progress], None] | None = None,
 ) -> ConversionResult:
-    """Convert a bag as settings say; see `convert_bag`."""
+    """Convert a bag as settings say, with definitions from elsewhere that it does not have; see `convert_bag`."""
     check_new(destination)
     if _is_inside(destination, source):
         raise RequestError(f"{destination} is inside of {source}, which is not changed; choose another place")
@@ -150,7 +158,7 @@ def convert_with(
     with written_aside(destination, is_folder=is_folder) as place:
         names = _names(recording, storage)
         tasks = [
-            FileTask(recording, index, file, source_format, target_format, storage, settings)
+            FileTask(recording, index, file, source_format, target_format, storage, settings, elsewhere)
             for index, file in enumerate([place / name for name in names] if is_folder else [place])
         ]
         made = workers.convert_files(tasks, _summed(progress, size))
@@ -206,7 +214,7 @@ def _form(recording: Recording, destination: Place, settings: Settings) -> tuple
 
 def _topics(recording: Recording) -> list[Topic]:
     """Return the topics of all files."""
-    if recording.metadata and any(file.compressed for file in recording.files):
+    if recording.metadata and any(file.is_copied for file in recording.files):
         return [information.topic for information in recording.metadata.topics]
     topics: list[Topic] = []
     for reader in recording.readers(salvage=True):  # what is damaged is said when it is converted

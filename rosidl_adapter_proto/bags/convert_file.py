@@ -27,6 +27,7 @@ from rosidl_adapter_proto.bags.storage import StorageReader, StorageWriter
 from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.converters import Converter
 from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 
 WINDOW_SIZE = 2**28
 """How many bytes of chunks are under way at once, not compressed, however many threads there are."""
@@ -44,6 +45,7 @@ class FileTask:
         target_format: What they are converted to.
         storage: The storage of what is written.
         settings: How else to convert.
+        elsewhere: Where definitions are that the file does not have.
     """
 
     recording: Recording
@@ -53,6 +55,7 @@ class FileTask:
     target_format: str
     storage: str
     settings: Settings
+    elsewhere: Catalog
 
 
 @dataclass(frozen=True)
@@ -131,11 +134,12 @@ class _FileConversion:
         self._task = task
         self._reader = reader
         self._writer = writer
-        self._types = BagTypes(
-            selected_topics(reader.topics, settings).values(), settings.include, settings.distro
+        find_types = partial(
+            BagTypes, include=settings.include, distro=settings.distro, elsewhere=task.elsewhere
         )
+        self._types = find_types(selected_topics(reader.topics, settings).values())
         self._routes = plan_routes(
-            reader.topics, reader.statistics, settings, task.target_format, self._types
+            reader.topics, reader.statistics, settings, task.target_format, self._types, find_types(())
         )
         self._failed_ids = self._reserve_failed_ids()
         self._ledger = Ledger(reader.path, self._routes, reader.statistics.message_counts, settings)

@@ -9,12 +9,13 @@ from pathlib import Path
 from threading import Lock
 
 from rosidl_adapter_proto.bags.conversion import ConversionResult, Progress, Settings
-from rosidl_adapter_proto.bags.convert import convert_with
+from rosidl_adapter_proto.bags.convert import convert_with, settings_of
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE
 from rosidl_adapter_proto.bags.places import Place, RemotePath, find_place, is_pattern, matching_places
 from rosidl_adapter_proto.bags.recorded_file import MCAP, SQLITE3, SUFFIXES, ZSTD_SUFFIX
 from rosidl_adapter_proto.bags.workers import Workers
 from rosidl_adapter_proto.errors import BagError, Error, RequestError
+from rosidl_adapter_proto.generate.request import find_catalog
 
 _FILE_SUFFIXES = {storage: suffix for suffix, storage in SUFFIXES.items() if storage in (MCAP, SQLITE3)}
 
@@ -144,7 +145,7 @@ def convert_bags(
         What became of the bags, in the order in which they were done.
     """
     workers = workers or Workers()
-    run = _Run(settings or Settings(), workers, len(tasks), progress or (lambda progress: None))
+    run = _Run(settings or settings_of(), workers, len(tasks), progress or (lambda progress: None))
     outcomes = []
     for folder in {task.destination.parent for task in tasks}:
         _make_folder(folder)
@@ -171,6 +172,7 @@ class _Run:
         self, settings: Settings, workers: Workers, bags: int, progress: Callable[[BagsProgress], None]
     ) -> None:
         self._settings = settings
+        self._elsewhere = find_catalog(settings.include, settings.distro)
         self._workers = workers
         self._progress = progress
         self._lock = Lock()
@@ -203,9 +205,10 @@ class _Run:
         try:
             if _is_done(task.destination):
                 return BagOutcome(*names)
-            return BagOutcome(
-                *names, convert_with(task.source, task.destination, self._settings, self._workers, add)
+            result = convert_with(
+                task.source, task.destination, self._settings, self._elsewhere, self._workers, add
             )
+            return BagOutcome(*names, result)
         except Error as error:
             return BagOutcome(*names, error=str(error))
         finally:

@@ -11,7 +11,7 @@ from typing import Any
 from google.protobuf import json_format
 from google.protobuf.descriptor import Descriptor
 
-from rosidl_adapter_proto.bags.bag import BagMessage
+from rosidl_adapter_proto.bags.message import BagMessage
 
 # Fields that are 0 or empty are printed too; protobuf 26 has another name for that.
 _ARGUMENTS = ("always_print_fields_with_no_presence", "including_default_value_fields")

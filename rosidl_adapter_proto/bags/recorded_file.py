@@ -21,7 +21,7 @@ from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
-from rosidl_adapter_proto.bags.places import find_place, local_copy
+from rosidl_adapter_proto.bags.places import RemotePath, find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
 from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteReader
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
@@ -63,6 +63,11 @@ class RecordedFile:
     path: str
     storage: str
     compressed: bool
+
+    @property
+    def is_copied(self) -> bool:
+        """Whether it is copied whole whenever it is opened, and so should not be opened just to look into it."""
+        return self.compressed or (self.storage == SQLITE3 and isinstance(find_place(self.path), RemotePath))
 
 
 def recognize(path: str) -> RecordedFile:
@@ -200,6 +205,7 @@ _OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {
     SQLITE3: _open_sqlite3,
     ROSBAG: _open_ros1,
 }
+"""Open a file, which the stack closes, also if it turns out that it cannot be read."""
 
 
 class _OpenedFile:

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fnmatch import fnmatchcase
-from functools import cached_property
 
 from rosidl_adapter_proto.bags.conversion import DEFAULT_FORMATS, OnError, Settings
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Statistics, Topic
@@ -97,6 +96,7 @@ def plan_routes(
     settings: Settings,
     target_format: str,
     types: BagTypes,
+    elsewhere: BagTypes,
 ) -> dict[int, TopicRoute]:
     """Return what becomes of each topic of a file, by its id.
 
@@ -106,11 +106,11 @@ def plan_routes(
         settings: How to convert.
         target_format: What to convert to.
         types: The types of the topics.
+        elsewhere: The types that are found where the bag is not, of which those of ROS 2 are for topics of ROS 1.
 
     Raises:
         BagError: Nothing is known of the type of a topic that has messages.
     """
-    ros2_types = _Ros2Types(settings)
     selected = selected_topics(topics, settings)
     routes = {topic_id: TopicRoute(topic, Fate.NOT_SELECTED) for topic_id, topic in topics.items()}
     for topic_id, topic in selected.items():
@@ -118,7 +118,7 @@ def plan_routes(
             routes[topic_id] = TopicRoute(topic, Fate.COPIED, topic)
             continue
         try:
-            routes[topic_id] = _converted(topic, target_format, types, ros2_types)
+            routes[topic_id] = _converted(topic, target_format, types, elsewhere)
         except (BagError, ConverterError) as error:
             if not statistics.message_counts.get(topic_id):
                 routes[topic_id] = TopicRoute(topic, Fate.COPIED, _without_definition(topic, target_format))
@@ -131,36 +131,20 @@ def plan_routes(
     return routes
 
 
-class _Ros2Types:
-    """Types of ROS 2 for messages that ROS 1 has recorded, which are looked for where the bag is not."""
+def _ros2_type(topic: Topic, ros1: Schema, elsewhere: BagTypes) -> tuple[Schema, RecordedDefinition]:
+    """Return the type of ROS 2 that messages of ROS 1 get, and its definition.
 
-    def __init__(self, settings: Settings) -> None:
-        self._settings = settings
-
-    @cached_property
-    def _types(self) -> BagTypes:
-        return BagTypes((), self._settings.include, self._settings.distro)
-
-    def find(self, topic: Topic, ros1: Schema) -> tuple[Schema, RecordedDefinition]:
-        """Return the type that messages of a topic get, and its definition.
-
-        Raises:
-            BagError: ROS 2 has no such type.
-            ConverterError: It has not all that the type of ROS 1 has.
-        """
-        ros2 = replace(
-            topic,
-            serialization_format=CDR,
-            definition=RecordedDefinition(),
-            ros_definition=RecordedDefinition(),
-            type_hash="",
-        )
-        found = self._types.schema(ros2)
-        check_ros2_type(ros1, found)
-        return found, self._types.ros_definition(ros2)
+    Raises:
+        BagError: ROS 2 has no such type.
+        ConverterError: It has not all that the type of ROS 1 has.
+    """
+    ros2 = Topic(topic.name, topic.type_name, CDR)
+    found = elsewhere.schema(ros2)
+    check_ros2_type(ros1, found)
+    return found, elsewhere.ros_definition(ros2)
 
 
-def _converted(topic: Topic, target_format: str, types: BagTypes, ros2_types: _Ros2Types) -> TopicRoute:
+def _converted(topic: Topic, target_format: str, types: BagTypes, elsewhere: BagTypes) -> TopicRoute:
     """Return the route of a topic whose messages are converted.
 
     Raises:
@@ -170,7 +154,7 @@ def _converted(topic: Topic, target_format: str, types: BagTypes, ros2_types: _R
     schema, ros_definition = types.schema(topic), types.ros_definition(topic)
     result_schema = schema
     if ros_definition.encoding == ROS1MSG and target_format != PROTOBUF:
-        result_schema, ros_definition = ros2_types.find(topic, schema)
+        result_schema, ros_definition = _ros2_type(topic, schema, elsewhere)
     result = _result(topic, target_format, result_schema, ros_definition)
     return TopicRoute(topic, Fate.CONVERTED, result, schema, result_schema)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import array
 import os
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.bag import Bag, open_bag
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 LOG_TIME = "log_time"
 PUBLISH_TIME = "publish_time"
+
+_THREADS = min(4, os.cpu_count() or 1)  # decompressing keeps no more of them busy while one fills columns
 
 
 def table_reader(
@@ -64,7 +66,7 @@ def table_reader(
         TypeError: A time is none, or `fields` is one text.
     """
     bag = bag if isinstance(bag, Bag) else open_bag(bag)
-    runs = bag.runs([topic], start=start, end=end)
+    runs = bag.runs([topic], start=start, end=end, threads=_THREADS)
     rows = _Rows(bag, topic, fields, maximum_rows, maximum_bytes)
     return pa.RecordBatchReader.from_batches(rows.arrow_schema, rows.record_batches(runs))
 
@@ -101,6 +103,7 @@ def write_table(
     fields: Iterable[str] | None = None,
     start: Time | None = None,
     end: Time | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> int:
     """Write the messages of a topic to a file, which appears when it is complete.
 
@@ -113,6 +116,7 @@ def write_table(
         fields: As for `table_reader`.
         start: As for `table_reader`.
         end: As for `table_reader`.
+        progress: Called with a number of rows once they are written.
 
     Returns:
         The number of rows.
@@ -136,6 +140,8 @@ def write_table(
         for batch in reader:
             table.write(batch)
             count += batch.num_rows
+            if progress is not None:
+                progress(batch.num_rows)
     return count
 
 
@@ -151,32 +157,9 @@ class _Rows:
     ) -> None:
         if isinstance(fields, str):
             raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
-        chosen = None if fields is None else tuple(fields)
         self._topic = topic
-        made: dict[tuple[Schema, str], ColumnReader] = {}
-        self._readers: dict[tuple[str, int], ColumnReader] = {}
-        for file in bag.files:
-            for topic_id, each in file.topics.items():
-                if each.name != topic:
-                    continue
-                schema, serialization_format = bag.types.schema(each), _serialization_format(each)
-                key = schema, serialization_format
-                if key not in made:
-                    made[key] = ColumnReader(
-                        schema,
-                        chosen,
-                        serialization_format=serialization_format,
-                        maximum_rows=maximum_rows,
-                        maximum_bytes=maximum_bytes,
-                    )
-                self._readers[file.path, topic_id] = made[key]
-        columns, *others = (each.arrow_schema for each in made.values())
-        if any(each != columns for each in others):
-            types = " and ".join(f"{schema.type_name} ({schema.type_hash})" for schema, _ in made)
-            raise BagError(
-                f"{bag.path}: {topic} has messages of several types, whose columns are not the same: {types}; choose "
-                "fields that are the same in all of them"
-            )
+        limits = {"maximum_rows": maximum_rows, "maximum_bytes": maximum_bytes}
+        self._readers, columns = _column_readers(bag, topic, fields, limits)
         self._log_times, self._publish_times = bytearray(), bytearray()
         self._count = 0
         names = (_free_name(each, columns.names) for each in (LOG_TIME, PUBLISH_TIME))
@@ -201,9 +184,8 @@ class _Rows:
     ) -> Iterator[pa.RecordBatch]:
         """Append messages, and yield record batches that are full."""
         ranges = _chosen(records.ranges, indexes, 2)
-        log_times, publish_times = _chosen(records.log_times, indexes), _chosen(
-            records.publish_times, indexes
-        )
+        log_times = _chosen(records.log_times, indexes)
+        publish_times = _chosen(records.publish_times, indexes)
         start = 0
         while start < len(indexes):
             try:
@@ -227,6 +209,31 @@ class _Rows:
         times = [_timestamps(each, self._topic) for each in (self._log_times, self._publish_times)]
         self._log_times, self._publish_times = bytearray(), bytearray()
         return pa.RecordBatch.from_arrays([*times, *batch.columns], schema=self.arrow_schema)
+
+
+def _column_readers(
+    bag: Bag, topic: str, fields: Iterable[str] | None, limits: Mapping[str, int]
+) -> tuple[dict[tuple[str, int], ColumnReader], pa.Schema]:
+    """Return what reads the messages of a topic, by file and topic id, and the columns, which all of them have."""
+    chosen = None if fields is None else tuple(fields)
+    made: dict[tuple[Schema, str], ColumnReader] = {}
+    readers: dict[tuple[str, int], ColumnReader] = {}
+    for file in bag.files:
+        for topic_id, each in file.topics.items():
+            if each.name != topic:
+                continue
+            key = bag.types.schema(each), _serialization_format(each)
+            if key not in made:
+                made[key] = ColumnReader(key[0], chosen, serialization_format=key[1], **limits)
+            readers[file.path, topic_id] = made[key]
+    columns, *others = (each.arrow_schema for each in made.values())
+    if any(each != columns for each in others):
+        types = " and ".join(f"{schema.type_name} ({schema.type_hash})" for schema, _ in made)
+        raise BagError(
+            f"{bag.path}: {topic} has messages of several types, whose columns are not the same: {types}; choose "
+            "fields that are the same in all of them"
+        )
+    return readers, columns
 
 
 def _serialization_format(topic: Topic) -> str:

@@ -54,8 +54,21 @@ def open_table(path: Path, file_format: str, schema: pa.Schema) -> TableFile:
 def _open_parquet(path: Path, schema: pa.Schema) -> TableFile:
     from pyarrow.parquet import ParquetWriter
 
-    writer: TableFile = ParquetWriter(path, schema)
+    # Numbers of sensors hardly repeat: looking for a dictionary of them takes four times as long as all the rest.
+    texts = list(_text_paths(schema))
+    writer: TableFile = ParquetWriter(path, schema, compression="zstd", use_dictionary=texts)
     return writer
+
+
+def _text_paths(fields: Iterable[pa.Field], path: str = "") -> Iterator[str]:
+    """Yield what Parquet calls the columns of texts."""
+    for field in fields:
+        if pa.types.is_struct(field.type):
+            yield from _text_paths(field.type, f"{path}{field.name}.")
+        elif _is_list(field.type):
+            yield from _text_paths([field.type.value_field.with_name("element")], f"{path}{field.name}.list.")
+        elif pa.types.is_string(field.type):
+            yield path + field.name
 
 
 def _open_arrow(path: Path, schema: pa.Schema) -> TableFile:

@@ -79,6 +79,7 @@ class ColumnReader:
     Raises:
         SchemaError: The type has no such field, or becomes too many columns.
         RequestError: The serialization format is another one.
+        ValueError: `maximum_rows` or `maximum_bytes` is not positive.
     """
 
     def __init__(
@@ -95,15 +96,16 @@ class ColumnReader:
                 f"tables are made of {', '.join(SERIALIZATIONS)} messages, not of {serialization_format!r} ones; "
                 "convert them first"
             )
+        if maximum_rows < 1 or maximum_bytes < 1:
+            raise ValueError("maximum_rows and maximum_bytes must be 1 or more")
         plan = build_plan(schema.type_description, schema.descriptor, fields=fields)
         self._columns = columns_of(plan)
-        self._fields = [_field(each) for each in self._columns]
         self._maximum_rows = maximum_rows
         self._maximum_bytes = maximum_bytes
         transcoder = _core.Transcoder(plan.pack(), plan.type_name, MAXIMUM_SIZE)
         layout, serialization = pack_layout(self._columns), SERIALIZATIONS.index(serialization_format)
         self._filler = _core.ColumnFiller(transcoder, layout, serialization)
-        self.arrow_schema = pa.schema([each for each in self._fields if each is not None])
+        self.arrow_schema = pa.schema(_fields(self._columns))
 
     def __len__(self) -> int:
         """Return the number of rows that the next record batch has so far."""
@@ -132,11 +134,10 @@ class ColumnReader:
         """Return what was appended since the last record batch."""
         rows, columns = self._filler.take()
         parts = iter(columns)
-        arrays = [_array(each, field, parts) for each, field in zip(self._columns, self._fields, strict=True)]
-        kept = [each for each in arrays if each is not None]
-        if not kept:
+        arrays = [array for each in self._columns if (array := _array(each, parts)) is not None]
+        if not arrays:  # then only this way tells how many rows there are
             return pa.RecordBatch.from_struct_array(pa.StructArray.from_buffers(pa.struct([]), rows, [None]))
-        return pa.RecordBatch.from_arrays(kept, schema=self.arrow_schema)
+        return pa.RecordBatch.from_arrays(arrays, schema=self.arrow_schema)
 
     def record_batches(
         self, messages: Sequence[Buffer] | Buffer, *, ranges: Buffer | None = None
@@ -150,10 +151,10 @@ class ColumnReader:
             yield self.record_batch()
 
 
-def _field(column: Column) -> pa.Field | None:
-    """Return the field of a column; None if there is nothing in it."""
-    data_type = _data_type(column)
-    return None if data_type is None else pa.field(column.name, data_type, nullable=False)
+def _fields(columns: Iterable[Column]) -> list[pa.Field]:
+    """Return the fields of columns, without those that have nothing inside."""
+    types = ((each.name, _data_type(each)) for each in columns)
+    return [pa.field(name, found, nullable=False) for name, found in types if found is not None]
 
 
 def _data_type(column: Column) -> pa.DataType | None:
@@ -164,40 +165,34 @@ def _data_type(column: Column) -> pa.DataType | None:
     if column.kind is ColumnKind.TIME:
         return pa.duration("ns") if column.type_name == DURATION else pa.timestamp("ns")
     if column.kind is ColumnKind.STRUCT:
-        fields = [field for each in column.columns if (field := _field(each)) is not None]
+        fields = _fields(column.columns)
         return pa.struct(fields) if fields else None
-    if column.kind is ColumnKind.NUMBERS:
-        if column.cdr is CdrForm.UINT8:
-            return pa.binary(column.length if column.is_array else -1)
-        item = pa.field("item", _NUMBERS[column.cdr], nullable=False)
-    elif (found := _field(column.columns[0])) is not None:
-        item = found
-    else:
-        return None
-    return pa.list_(item, column.length if column.is_array else -1)
+    length = column.length if column.is_array else -1
+    if column.kind is ColumnKind.LIST:
+        items = _fields(column.columns)
+        return pa.list_(items[0], length) if items else None
+    if column.cdr is CdrForm.UINT8:
+        return pa.binary(length)
+    return pa.list_(pa.field("item", _NUMBERS[column.cdr], nullable=False), length)
 
 
 _Part = tuple[int, Any, Any]
 """What the core has of a column: its number of rows, its offsets, and its values."""
 
 
-def _array(column: Column, field: pa.Field | None, parts: Iterator[_Part]) -> pa.Array | None:
-    """Return the array of a column, and take its parts and those of the columns inside of it."""
+def _array(column: Column, parts: Iterator[_Part]) -> pa.Array | None:
+    """Return the array of a column; it takes its part, and those of the columns inside of it, off `parts`."""
     rows, offsets, values = next(parts)
-    data_type = None if field is None else field.type
-    inner: list[pa.Array | None] = []
-    if column.kind is ColumnKind.STRUCT:
-        fields = {each.name: each for each in (data_type or ())}
-        inner = [_array(each, fields.get(each.name), parts) for each in column.columns]
-    elif column.kind is ColumnKind.LIST:
-        inner = [_array(column.columns[0], data_type and data_type.value_field, parts)]
+    buffers = [None] if offsets is None else [None, pa.py_buffer(offsets)]
+    children = None
+    if column.kind in (ColumnKind.STRUCT, ColumnKind.LIST):
+        children = [array for each in column.columns if (array := _array(each, parts)) is not None]
     elif column.kind is ColumnKind.NUMBERS and column.cdr is not CdrForm.UINT8:
-        count = rows * column.length if column.is_array else memoryview(offsets).cast("I")[rows]
-        inner = [pa.Array.from_buffers(_NUMBERS[column.cdr], count, [None, pa.py_buffer(values)])]
+        count = rows * column.length if offsets is None else memoryview(offsets).cast("I")[rows]
+        children = [pa.Array.from_buffers(_NUMBERS[column.cdr], count, [None, pa.py_buffer(values)])]
+    else:
+        buffers.append(pa.py_buffer(values))
+    data_type = _data_type(column)
     if data_type is None:
         return None
-    buffers = [None] if offsets is None else [None, pa.py_buffer(offsets)]
-    if column.kind is not ColumnKind.STRUCT and column.kind is not ColumnKind.LIST and not inner:
-        buffers.append(pa.py_buffer(values))
-    children = [each for each in inner if each is not None]
-    return pa.Array.from_buffers(data_type, rows, buffers, null_count=0, children=children or None)
+    return pa.Array.from_buffers(data_type, rows, buffers, null_count=0, children=children)

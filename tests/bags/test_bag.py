@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tracemalloc
 from collections.abc import Callable, Iterable
 from datetime import timezone
 from pathlib import Path
@@ -13,8 +14,9 @@ import pytest
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, JOINT_STATES, SMALL_IMAGE, START, TF, Recorded, record
 from rosidl_adapter_proto import BagError, SchemaError, adapter_for, open_bag
-from rosidl_adapter_proto.bags.bag import Bag, BagMessage
+from rosidl_adapter_proto.bags.bag import Bag
 from rosidl_adapter_proto.bags.convert import convert_bag
+from rosidl_adapter_proto.bags.message import BagMessage
 from rosidl_adapter_proto.time import to_datetime, to_nanoseconds
 from tests.bags.values import assert_same_values
 
@@ -381,6 +383,77 @@ def test_protobuf_messages_that_ros_does_not_know(tmp_path: Path) -> None:
 
     assert message.message.seconds == 3
     assert "protobuf messages of no ROS type" in error_of(lambda: open_bag(path).schema("/one"))
+
+
+@pytest.fixture
+def ros1_bag(tmp_path: Path) -> Path:
+    """A bag of ROS 1 with points that were recorded in no order."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types = store.types
+    path = tmp_path / "ros1.bag"
+    with Writer(path) as writer:
+        connection = writer.add_connection("/point", "geometry_msgs/msg/PointStamped", typestore=store)
+        for number in (0, 2, 1):
+            stamp = types["builtin_interfaces/msg/Time"](sec=number, nanosec=5)
+            header = types["std_msgs/msg/Header"](seq=number, stamp=stamp, frame_id="map")
+            point = types["geometry_msgs/msg/Point"](x=float(number), y=0.0, z=-1.0)
+            message = types["geometry_msgs/msg/PointStamped"](header=header, point=point)
+            writer.write(connection, START + number, store.serialize_ros1(message, connection.msgtype))
+    return path
+
+
+def test_ros1_bags(ros1_bag: Path) -> None:
+    with open_bag(ros1_bag) as bag:
+        topic = bag.topics["/point"]
+        assert (topic.type_name, topic.serialization_format) == ("geometry_msgs/msg/PointStamped", "ros1")
+        for number, (_, point, time) in enumerate(bag.messages()):
+            assert time == START + number
+            assert (point.header.seq, point.header.stamp.sec, point.header.stamp.nanosec) == (
+                number,
+                number,
+                5,
+            )
+            assert (point.header.frame_id, point.point.x, point.point.z) == ("map", number, -1.0)
+        (_, point, _), *rest = bag.messages(fields=["header.stamp.sec", "point.z"], start=START + 2)
+        assert (point.header.seq, point.header.stamp.sec, point.point.x, point.point.z) == (0, 2, 0.0, -1.0)
+        assert rest == []
+
+
+def test_only_chunks_that_overlap_are_in_memory(tmp_path: Path) -> None:
+    path = tmp_path / "bag.mcap"
+    bag_maker.write_mcap(path, record([bag_maker.SCAN], 100), chunk_size=200_000)
+    bag = open_bag(path)
+    next(bag.messages()).message  # noqa: B018  # what is made at the first use does not count
+    tracemalloc.start()
+    try:
+        assert sum(len(each.message.ranges) for each in bag.messages()) == 2000 * 720
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert path.stat().st_size > 10_000_000
+    assert peak < 2_000_000
+
+
+def test_a_topic_of_several_types(tmp_path: Path) -> None:
+    other = bag_maker.Stream("/imu", "sensor_msgs/msg/JointState", 50, bag_maker.joint_state)
+    path = tmp_path / "bag.mcap"
+    bag_maker.write_mcap(path, record([IMU, other], 0.02))
+    bag = open_bag(path)
+
+    assert bag.topics["/imu"].message_count == bag.message_count == 5
+    assert bag.warnings == [
+        f"{path}: topic /imu has several types: sensor_msgs/msg/Imu, sensor_msgs/msg/JointState"
+    ]
+    assert [type(each.message).__name__ for each in bag.messages()] == [
+        "Imu",
+        "JointState",
+        "Imu",
+        "Imu",
+        "Imu",
+    ]
 
 
 def test_another_serialization_format(tmp_path: Path) -> None:

@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from mcap.writer import CompressionType
 
 from rosidl_adapter_proto.bags.conversion import ConversionResult, Counts
 from rosidl_adapter_proto.bags.convert import convert_bag
-from rosidl_adapter_proto.errors import BagError, ConverterError, RequestError
+from rosidl_adapter_proto.errors import BagError, ConverterError, Error, RequestError
 from tests.bags.recordings import START, STRING, Recorded, contents, mcap_bytes, rows, string_cdr, strings
 
 pytestmark = pytest.mark.usefixtures("folder")
@@ -327,3 +329,35 @@ def test_there_is_nothing() -> None:
     assert contents(Path("out.mcap")).messages == []
     with pytest.raises(BagError, match=r"^out\.mcap exists, and nothing is overwritten"):
         convert_bag("in.mcap", "out.mcap")
+
+
+# Garbage
+
+
+SOUND = mcap_bytes(
+    [*strings("/a", 30), *strings("/b", 5)],
+    compression=CompressionType.LZ4,
+    attachments=[("map", b"x" * 50)],
+    metadata=[("recorder", {"a": "b"})],
+)
+
+
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    place=st.integers(0, len(SOUND) - 1),
+    change=st.binary(min_size=1, max_size=9),
+    cut=st.booleans(),
+    on_error=st.sampled_from(["stop", "skip", "copy"]),
+)
+def test_garbage_is_an_error_or_accounted_for(place: int, change: bytes, cut: bool, on_error: str) -> None:
+    rest = b"" if cut else SOUND[place + len(change) :]
+    Path("garbage.mcap").write_bytes(SOUND[:place] + change + rest)
+    Path("garbage_out.mcap").unlink(missing_ok=True)
+    try:
+        result = convert_bag("garbage.mcap", "garbage_out.mcap", on_error=on_error, threads=1)
+    except Error:
+        assert not Path("garbage_out.mcap").exists()
+    else:
+        kept = len(contents(Path("garbage_out.mcap")).messages)
+        assert result.total.converted + result.total.copied == kept
+    assert not list(Path().glob(".*"))

@@ -9,6 +9,8 @@ from typing import Any
 import numpy
 import pytest
 from rosbags.rosbag1 import Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from rosidl_adapter_proto import TypeRegistry
@@ -172,3 +174,28 @@ def test_ros1_is_not_written() -> None:
         convert_bag("there.mcap", "back.mcap", target_format="ros1")
     with pytest.raises(ConverterError, match=r"^Could not find converter for format rosbag_v2"):
         convert_bag("there.mcap", "back.mcap", target_format="rosbag_v2")
+
+
+# What rosbag2 has compressed
+
+
+@pytest.mark.parametrize("mode", ["FILE", "MESSAGE"])
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+def test_compressed_by_rosbag2(mode: str, storage: str) -> None:
+    """Of what is compressed there, chunks are compressed."""
+    store = get_typestore(Stores.ROS2_KILTED)
+    messages = strings("/a", 30)
+    writer = Rosbag2Writer(Path("in"), version=8, storage_plugin=StoragePlugin[storage])
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/a", STRING, typestore=store)
+        for each in messages:
+            writer.write(connection, each.log_time, each.data)
+
+    result = convert_bag("in", "there", storage="mcap")
+    assert result.total == Counts(converted=30) and not result.warnings
+    assert contents(Path("there/in.mcap")).compressions == {"zstd"}
+    convert_bag("there", "back.mcap")
+    assert [(each.log_time, each.data) for each in contents(Path("back.mcap")).messages] == [
+        (each.log_time, each.data) for each in messages
+    ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import json
 import subprocess
@@ -15,6 +16,8 @@ import pyarrow as pa
 import pyarrow.feather
 import pyarrow.parquet
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from reference_cdr import write_cdr
 from ros_types import Types, struct_type
 
@@ -35,7 +38,7 @@ from rosidl_adapter_proto import BagError, SchemaError
 from rosidl_adapter_proto.bags.convert import convert_bag
 from rosidl_adapter_proto.bags.table import record_batches, table_reader, write_table
 from rosidl_adapter_proto.cli import main
-from rosidl_adapter_proto.errors import RequestError
+from rosidl_adapter_proto.errors import Error, RequestError
 from tests.columns import rows_of
 
 STREAMS = (IMU, JOINT_STATES, SCAN, SMALL_IMAGE, TF)
@@ -315,6 +318,22 @@ def test_a_message_that_is_not_valid(tmp_path: Path) -> None:
     assert error(BagError, lambda: list(record_batches(path, "/t", maximum_rows=1))) == text
     assert error(BagError, lambda: write_table(path, "/t", tmp_path / "t.parquet")) == text
     assert [each.name for each in tmp_path.iterdir()] == ["b.mcap"]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(data=st.data())
+def test_damaged_files(recorded: list[Recorded], tmp_path: Path, data: st.DataObject) -> None:
+    path = tmp_path / "b.mcap"
+    messages = [each for each in recorded if each.stream in (JOINT_STATES, TF)][:20]
+    write_mcap(path, messages, compression=data.draw(st.sampled_from(["", "zstd"])), chunk_size=3000)
+    damaged = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 5))):
+        place = data.draw(st.integers(0, len(damaged) - 1))
+        damaged[place] = data.draw(st.integers(0, 255))
+    path.write_bytes(damaged)
+    with contextlib.suppress(Error):
+        for batch in record_batches(path, "/tf"):
+            batch.validate(full=True)
 
 
 def test_a_time_that_no_timestamp_has(tmp_path: Path) -> None:

@@ -189,6 +189,27 @@ def test_chosen_fields(fields: list[str], expected: dict[str, Any], form: str) -
     assert rows_of(reader.record_batch()) == [expected]
 
 
+def test_messages_of_ros_1() -> None:
+    types = {
+        **TIMES,
+        **struct_type("test/msg/Empty", structure_needs_at_least_one_member="uint8"),
+        **struct_type(
+            "test/msg/R",
+            a="int8",
+            stamp="builtin_interfaces/msg/Time",
+            names="string[]",
+            nothing="test/msg/Empty",
+            x="double",
+        ),
+    }
+    ros1 = struct.pack("<bIIII2sI0sd", 1, 5, 6, 2, 2, b"ab", 0, b"", 2.5)
+    reader = ColumnReader(schema_of(types, "test/msg/R"), serialization_format="ros1")
+    reader.append([ros1])
+    assert rows_of(reader.record_batch()) == [{"a": 1, "stamp": 5_000_000_006, "names": ["ab", ""], "x": 2.5}]
+    with pytest.raises(TranscodeError, match="1 bytes follow the last field"):
+        reader.append([ros1 + b"0"])
+
+
 # Batches -------------------------------------------------------------------------------------------------------------
 
 
@@ -294,6 +315,13 @@ def test_other_formats() -> None:
     assert str(caught.value) == (
         "tables are made of cdr, protobuf, ros1 messages, not of 'json' ones; convert them first"
     )
+
+
+def test_sizes_of_record_batches() -> None:
+    for limit in ("maximum_rows", "maximum_bytes"):
+        arguments: Any = {limit: 0}
+        with pytest.raises(ValueError, match="maximum_rows and maximum_bytes must be 1 or more"):
+            ColumnReader(schema_of(STRING, "test/msg/String"), **arguments)
 
 
 def test_too_many_columns() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -47,5 +50,28 @@ def command(
         raise RequestError(str(error)) from None
     names = None if fields is None else [name.strip() for name in fields.split(",")]
     with open_bag(bag, include=include, distro=distro) as opened:
-        rows = write_table(opened, topic, output, file_format=file_format, fields=names, start=start, end=end)
+        found = opened.topics.get(topic)
+        with _progress_bar(found.message_count if found else 0) as progress:
+            rows = write_table(
+                opened,
+                topic,
+                output,
+                file_format=file_format,
+                fields=names,
+                start=start,
+                end=end,
+                progress=progress,
+            )
+        for warning in opened.warnings:
+            click.echo(f"Warning: {warning}", err=True)
     click.echo(f"{output}: {rows} rows")
+
+
+@contextmanager
+def _progress_bar(length: int) -> Iterator[Callable[[int], None] | None]:
+    """Show how far the work is, on a terminal; yield what to tell it."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    with click.progressbar(length=length, file=sys.stderr) as bar:
+        yield bar.update
