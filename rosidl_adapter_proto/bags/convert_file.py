@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 from rosidl_adapter_proto.bags.chunks import ConvertedChunk, chunk_converter, convert_chunk
 from rosidl_adapter_proto.bags.compression import ZSTD
@@ -19,6 +18,7 @@ from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import write_inner_metadata
 from rosidl_adapter_proto.bags.model import CDR, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.pipeline import map_in_order
+from rosidl_adapter_proto.bags.places import Place, written_locally
 from rosidl_adapter_proto.bags.recorded_file import SQLITE3
 from rosidl_adapter_proto.bags.recording import Recording
 from rosidl_adapter_proto.bags.routes import MIXED_FORMATS, Fate, plan_routes, selected_topics
@@ -50,7 +50,7 @@ class FileTask:
 
     recording: Recording
     index: int
-    destination: Path
+    destination: Place
     source_format: str
     target_format: str
     storage: str
@@ -84,6 +84,13 @@ def convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileRe
         BagError: A message or the file cannot be converted, and it was not asked to go on; the file to write cannot be
             written; or there are other numbers of messages than the file itself says.
     """
+    if task.storage == SQLITE3:  # whose library writes nothing but files of this machine
+        with written_locally(task.destination) as local:
+            return _convert_file(replace(task, destination=local), progress)
+    return _convert_file(task, progress)
+
+
+def _convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileResult:
     salvage = task.settings.on_error is not OnError.STOP
     with task.recording.open(task.index, salvage) as reader, _open_writer(task, reader) as writer:
         selected = selected_topics(reader.topics, task.settings)

@@ -8,13 +8,13 @@ from __future__ import annotations
 import array
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.bag import Bag, open_bag
 from rosidl_adapter_proto.bags.model import Topic
 from rosidl_adapter_proto.bags.order import Run
 from rosidl_adapter_proto.bags.output import check_new, written_aside
+from rosidl_adapter_proto.bags.places import find_place, written_locally
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.bags.table_files import format_of, open_table
 from rosidl_adapter_proto.errors import BagError
@@ -110,7 +110,7 @@ def write_table(
     Args:
         bag: As for `table_reader`.
         topic: As for `table_reader`.
-        output: The file; nothing may be there.
+        output: The file, by a path or a URL; nothing may be there.
         file_format: `parquet`, `arrow` or `csv`; by default what the suffix of the file says: `.parquet`, `.arrow`,
             `.feather` or `.csv`.
         fields: As for `table_reader`.
@@ -127,12 +127,16 @@ def write_table(
         SchemaError: As for `table_reader`.
         TypeError: As for `table_reader`.
     """
-    path = Path(output)
+    path = find_place(output)
     chosen = format_of(path, file_format)
     check_new(path)
     reader = table_reader(bag, topic, fields=fields, start=start, end=end)
     count = 0
-    with written_aside(path, is_folder=False) as place, open_table(place, chosen, reader.schema) as table:
+    with (
+        written_aside(path, is_folder=False) as place,
+        written_locally(place) as local,
+        open_table(local, chosen, reader.schema) as table,
+    ):
         for batch in reader:
             table.write(batch)
             count += batch.num_rows
