@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         DefinitionError,
         Error,
         GenerateError,
+        PlaceError,
         RequestError,
         SchemaError,
     )
@@ -47,6 +48,7 @@ __all__ = [
     "DefinitionError",
     "Error",
     "GenerateError",
+    "PlaceError",
     "RequestError",
     "Schema",
     "SchemaError",

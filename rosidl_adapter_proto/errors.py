@@ -40,6 +40,13 @@ class BagError(Error):
     """A bag cannot be read, converted or written."""
 
 
+class PlaceError(Error):
+    """A place on another machine, or a process, failed while a bag was read or written: another try may go well.
+
+    It is no `BagError`, so that nobody takes a broken connection for a damaged bag.
+    """
+
+
 class ConversionError(Error):
     """A value does not fit the type on the other side.
 

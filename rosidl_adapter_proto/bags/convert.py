@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
+from threading import Lock
+from typing import TYPE_CHECKING, Any
 
 from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Progress, Settings
-from rosidl_adapter_proto.bags.convert_file import FileTask, convert_file
+from rosidl_adapter_proto.bags.convert_file import FileTask
 from rosidl_adapter_proto.bags.description import WrittenFile, describe
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, write_metadata
 from rosidl_adapter_proto.bags.model import Topic
 from rosidl_adapter_proto.bags.output import check_new, written_aside
+from rosidl_adapter_proto.bags.places import Place, file_size, find_place
 from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFIXES, ZSTD_SUFFIX
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.routes import formats, selected_topics
+from rosidl_adapter_proto.bags.workers import Workers
 from rosidl_adapter_proto.converters import ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.request import find_catalog
+from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.time import to_nanoseconds
 
 if TYPE_CHECKING:
@@ -48,6 +51,7 @@ def convert_bag(
     registry: ConverterRegistry | None = None,
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
+    workers: Workers | None = None,
 ) -> ConversionResult:
     """Convert a bag.
 
@@ -55,8 +59,9 @@ def convert_bag(
     never overwritten, and if anything fails, nothing is left of the result.
 
     Args:
-        source: A folder that rosbag2 has recorded, a file of one, or a ROS 1 bag.
+        source: A folder that rosbag2 has recorded, a file of one, or a ROS 1 bag; a path, or a URL that fsspec knows.
         destination: The folder to write; or the file, if its name ends as those of a storage (`.mcap`, `.db3`) do.
+            It may be a URL likewise.
         source_format: How the messages are serialized, whatever the bag says; by default what it says.
         target_format: What to convert to; by default `protobuf`, and `cdr` if the messages are protobuf.
         storage: The storage of the result, `mcap` or `sqlite3`; by default that of the source, and `mcap` for ROS 1.
@@ -71,7 +76,8 @@ def convert_bag(
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else.
         registry: Where converter plugins come from; by default those that are installed.
         threads: On how many threads to convert; by default one for each processor.
-        progress: Called whenever something was written.
+        progress: Called whenever something was written, on any thread, but never on two at a time.
+        workers: Where to convert the files of the bag, several at a time; by default here, one after the other.
 
     Returns:
         What was done. All numbers together are what the storage itself says.
@@ -81,30 +87,64 @@ def convert_bag(
         ConverterError: There is no converter for a serialization format.
         DefinitionError: A folder with definitions cannot be read.
         RequestError: What is asked for does not fit the bag.
+        PlaceError: A place that is not on this machine cannot be reached.
     """
-    settings = Settings(
+    settings = settings_of(
         source_format=source_format,
         target_format=target_format,
         storage=storage,
         compression=compression,
+        topics=topics,
+        excluded_topics=excluded_topics,
+        start=start,
+        end=end,
+        on_error=on_error,
+        include=include,
+        distro=distro,
+        registry=registry,
+        threads=threads,
+    )
+    elsewhere = find_catalog(settings.include, settings.distro)
+    return convert_with(
+        find_place(source), find_place(destination), settings, elsewhere, workers or Workers(), progress
+    )
+
+
+def settings_of(
+    *,
+    topics: Iterable[str] = (),
+    excluded_topics: Iterable[str] = (),
+    start: Time | None = None,
+    end: Time | None = None,
+    on_error: str = "stop",
+    include: Iterable[Path | str] = (),
+    registry: ConverterRegistry | None = None,
+    **others: Any,
+) -> Settings:
+    """Return the settings that are the arguments of `convert_bag`."""
+    return Settings(
         topics=tuple(topics),
         excluded_topics=tuple(excluded_topics),
         start_time=0 if start is None else to_nanoseconds(start),
         end_time=None if end is None else to_nanoseconds(end),
         on_error=OnError(on_error),
         include=tuple(map(Path, include)),
-        distro=distro,
         registry=registry or ConverterRegistry(),
-        threads=threads,
+        **others,
     )
-    return _convert(Path(source), Path(destination), settings, progress)
 
 
-def _convert(
-    source: Path, destination: Path, settings: Settings, progress: Callable[[Progress], None] | None
+def convert_with(
+    source: Place,
+    destination: Place,
+    settings: Settings,
+    elsewhere: Catalog,
+    workers: Workers,
+    progress: Callable[[Progress], None] | None = None,
 ) -> ConversionResult:
+    """Convert a bag as settings say, with definitions from elsewhere that it does not have; see `convert_bag`."""
     check_new(destination)
-    if destination.resolve().is_relative_to(source.resolve()):
+    if _is_inside(destination, source):
         raise RequestError(f"{destination} is inside of {source}, which is not changed; choose another place")
     recording = find_recording(str(source))
     storage, is_folder = _form(recording, destination, settings)
@@ -112,41 +152,48 @@ def _convert(
     _check_names([*settings.topics, *settings.excluded_topics], topics)
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
-    elsewhere = find_catalog(settings.include, settings.distro)
-    size = sum(os.path.getsize(file.path) for file in recording.files)
+    size = sum(file_size(find_place(file.path)) for file in recording.files)
     result = ConversionResult(warnings=recording.warnings, source_size=size)
     written: list[WrittenFile] = []
-    add_progress = _summed(progress, size)
     with written_aside(destination, is_folder=is_folder) as place:
-        for index, name in enumerate(_names(recording, storage)):
-            file = place / name if is_folder else place
-            task = FileTask(
-                recording, index, file, source_format, target_format, storage, settings, elsewhere
-            )
-            made = convert_file(task, add_progress)
-            written.append(WrittenFile(name, made.topics, made.statistics))
-            result += replace(made.result, size=file.stat().st_size)
+        names = _names(recording, storage)
+        tasks = [
+            FileTask(recording, index, file, source_format, target_format, storage, settings, elsewhere)
+            for index, file in enumerate([place / name for name in names] if is_folder else [place])
+        ]
+        made = workers.convert_files(tasks, _summed(progress, size))
+        for name, task, each in zip(names, tasks, made, strict=True):
+            written.append(WrittenFile(name, each.topics, each.statistics))
+            result += replace(each.result, size=file_size(task.destination))
         if is_folder:
             text = write_metadata(describe(storage, written, recording.metadata))
-            (place / METADATA_FILE).write_text(text, encoding="utf-8")
+            (place / METADATA_FILE).write_bytes(text.encode())
     return result
+
+
+def _is_inside(destination: Place, source: Place) -> bool:
+    if isinstance(source, Path) and isinstance(destination, Path):
+        return destination.resolve().is_relative_to(source.resolve())
+    return f"{destination}/".startswith(f"{source}/")
 
 
 def _summed(progress: Callable[[Progress], None] | None, total: int) -> Callable[[int, int], None]:
     """Return what adds up the progress of all files, and tells it."""
     done = message_count = 0
+    lock = Lock()
 
     def add(size: int, messages: int) -> None:
         nonlocal done, message_count
-        done += size
-        message_count += messages
-        if progress:
-            progress(Progress(min(done, total), total, message_count))
+        with lock:
+            done += size
+            message_count += messages
+            if progress:
+                progress(Progress(min(done, total), total, message_count))
 
     return add
 
 
-def _form(recording: Recording, destination: Path, settings: Settings) -> tuple[str, bool]:
+def _form(recording: Recording, destination: Place, settings: Settings) -> tuple[str, bool]:
     """Return the storage of the result, and whether it is a folder."""
     by_name = SUFFIXES.get(destination.suffix)
     storage = settings.storage or by_name or recording.storage
@@ -167,7 +214,7 @@ def _form(recording: Recording, destination: Path, settings: Settings) -> tuple[
 
 def _topics(recording: Recording) -> list[Topic]:
     """Return the topics of all files."""
-    if recording.metadata and any(file.compressed for file in recording.files):
+    if recording.metadata and any(file.is_copied for file in recording.files):
         return [information.topic for information in recording.metadata.topics]
     topics: list[Topic] = []
     for reader in recording.readers(salvage=True):  # what is damaged is said when it is converted
@@ -184,7 +231,7 @@ def _check_names(patterns: Sequence[str], topics: Sequence[Topic]) -> None:
 
 def _names(recording: Recording, storage: str) -> list[str]:
     """Return the names of the files of the result, after those of the source."""
-    stems = [Path(Path(file.path).name.removesuffix(ZSTD_SUFFIX)).stem for file in recording.files]
+    stems = [Path(find_place(file.path).name.removesuffix(ZSTD_SUFFIX)).stem for file in recording.files]
     return [
         (stem if stems.count(stem) == 1 else f"{stem}_{index}") + _WRITTEN[storage]
         for index, stem in enumerate(stems)

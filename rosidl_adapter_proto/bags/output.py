@@ -2,6 +2,9 @@
 
 What is written lies in a folder beside its place, `.NAME.partial-XXXXXXXX`, which is locked as long as its run lives.
 If a run is killed, that folder is all that is left of it, and the next run to the same place removes it.
+
+File systems elsewhere have neither locks nor, often, names that can be changed: there each file is moved, which object
+stores do by copying it, metadata.yaml last, and what a run leaves that was killed stays.
 """
 
 from __future__ import annotations
@@ -16,7 +19,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.bags.metadata import METADATA_FILE
+from rosidl_adapter_proto.bags.places import Place, RemotePath
+from rosidl_adapter_proto.errors import BagError, Error
 
 if sys.platform != "win32":
     import fcntl
@@ -27,7 +32,7 @@ _NO_REPLACE = 1
 
 
 @contextlib.contextmanager
-def written_aside(destination: Path, *, is_folder: bool) -> Iterator[Path]:
+def written_aside(destination: Place, *, is_folder: bool) -> Iterator[Place]:
     """Yield where to write what belongs to `destination`, and move it there when the block is done.
 
     Everything is on the disk before it has its name. If the block fails, nothing of it is left.
@@ -38,11 +43,16 @@ def written_aside(destination: Path, *, is_folder: bool) -> Iterator[Path]:
 
     Raises:
         BagError: Something is there, another run is writing it, or the file system refuses.
+        PlaceError: The file system cannot be reached.
     """
+    if isinstance(destination, RemotePath):
+        with _written_aside_remotely(destination, is_folder) as remote_place:
+            yield remote_place
+        return
     try:
         check_new(destination)
         _remove_left_over(destination)
-        aside = destination.parent / (_PARTIAL.format(destination.name) + secrets.token_hex(4))
+        aside = destination.with_name(_aside_name(destination))
         aside.mkdir()
         try:
             with _locked(aside):
@@ -62,19 +72,58 @@ def written_aside(destination: Path, *, is_folder: bool) -> Iterator[Path]:
         ) from error
 
 
-def check_new(destination: Path) -> None:
+@contextlib.contextmanager
+def _written_aside_remotely(destination: RemotePath, is_folder: bool) -> Iterator[RemotePath]:
+    """Do the same in a file system that is not on this machine."""
+    check_new(destination)
+    aside = destination.with_name(_aside_name(destination))
+    place = aside / destination.name
+    try:
+        (place if is_folder else aside).mkdir()
+        yield place
+        check_new(destination)
+        _move_remotely(place, destination, is_folder)
+    finally:
+        with contextlib.suppress(Error):  # what went wrong before is what counts
+            aside.remove()
+
+
+def _move_remotely(source: RemotePath, destination: RemotePath, is_folder: bool) -> None:
+    """Move a file, or the files of a folder, of which metadata.yaml comes last: without it the bag is not complete."""
+    try:
+        if not is_folder:
+            source.move_file(destination)
+            return
+        destination.mkdir()
+        for file in sorted(source.iterdir(), key=lambda file: (file.name == METADATA_FILE, file.name)):
+            file.move_file(destination / file.name)
+    except BaseException:
+        with contextlib.suppress(Error):
+            destination.remove()
+        raise
+
+
+def _aside_name(destination: Place) -> str:
+    return _PARTIAL.format(destination.name) + secrets.token_hex(4)
+
+
+def check_new(destination: Place) -> None:
     """Check that nothing is at a place yet, and that the folder that it goes to is there.
 
     Raises:
         BagError: It is not so.
     """
+    if isinstance(destination, RemotePath):
+        if destination.exists():
+            raise _exists(destination)
+        return  # its file system makes folders as they are needed, if it has any
     if os.path.lexists(destination):
         raise _exists(destination)
     if not destination.parent.is_dir():
         raise BagError(f"cannot write {destination}: there is no folder {destination.parent}; make it first")
 
 
-def _exists(destination: Path) -> BagError:
+def _exists(destination: Place) -> BagError:
     return BagError(f"{destination} exists, and nothing is overwritten; choose another name, or remove it")
 
 

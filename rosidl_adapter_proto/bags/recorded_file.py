@@ -21,8 +21,9 @@ from rosidl_adapter_proto.bags.mcap_reader import McapReader
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.places import RemotePath, find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
-from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
+from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteReader
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
 from rosidl_adapter_proto.errors import BagError
@@ -61,6 +62,11 @@ class RecordedFile:
     storage: str
     compressed: bool
 
+    @property
+    def is_copied(self) -> bool:
+        """Whether it is copied whole whenever it is opened, and so should not be opened just to look into it."""
+        return self.compressed or (self.storage == SQLITE3 and isinstance(find_place(self.path), RemotePath))
+
 
 def recognize(path: str) -> RecordedFile:
     """Return what a file is, whatever its name.
@@ -92,7 +98,7 @@ def open_file(path: str) -> BinaryIO:
         BagError: It cannot be opened.
     """
     try:
-        return open(path, "rb")
+        return find_place(path).open("rb")
     except OSError as error:
         raise BagError(f"{path}: {error.strerror}") from None
 
@@ -152,7 +158,7 @@ def create_file(
 def _decompressed(path: str, stack: ExitStack) -> tuple[str, BagError | None]:
     """Return a temporary file with what another has compressed, and why that is not all of it."""
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-"))
-    target = Path(folder, Path(path).name.removesuffix(ZSTD_SUFFIX))
+    target = Path(folder, find_place(path).name.removesuffix(ZSTD_SUFFIX))
     room = shutil.disk_usage(folder).free - _SPARE_SPACE
     with open_file(path) as source, target.open("wb") as file:
         try:
@@ -198,7 +204,9 @@ def _open_ros1(path: str, name: str, salvage: bool, stack: ExitStack) -> Storage
 
 
 def _open_sqlite3(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
-    return SqliteReader(path, name, salvage=salvage)
+    # Its library reads nothing but files of this machine.
+    copy = stack.enter_context(local_copy(find_place(path), JOURNAL_SUFFIXES))
+    return SqliteReader(str(copy), name, salvage=salvage)
 
 
 _OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {

@@ -6,11 +6,12 @@ ROS 1 bag.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rosidl_adapter_proto.bags.metadata import MAXIMUM_SIZE, METADATA_FILE, BagMetadata, read_metadata
+from rosidl_adapter_proto.bags.places import Place, find_place
 from rosidl_adapter_proto.bags.recorded_file import (
     SUFFIXES,
     ZSTD_SUFFIX,
@@ -72,7 +73,7 @@ def find_recording(path: str) -> Recording:
     Raises:
         BagError: There is none, or a file of it is missing.
     """
-    place = Path(path)
+    place = find_place(path)
     if place.is_dir():
         return _folder(place)
     if not place.exists():
@@ -84,10 +85,11 @@ def find_recording(path: str) -> Recording:
     return Recording(path, (file,), metadata, warnings)
 
 
-def _folder(folder: Path) -> Recording:
+def _folder(folder: Place) -> Recording:
     place = folder / METADATA_FILE
     present = sorted(
-        path for path in folder.iterdir() if Path(_plain_name(path)).suffix in SUFFIXES and path.is_file()
+        (path for path in folder.iterdir() if Path(_plain_name(path)).suffix in SUFFIXES and path.is_file()),
+        key=str,
     )
     metadata = _read_metadata(place)
     if metadata is not None and metadata.paths:
@@ -97,13 +99,13 @@ def _folder(folder: Path) -> Recording:
             f"{folder}: no {METADATA_FILE} that names files, and no {', '.join(SUFFIXES)} files in it"
         )
     files = _by_start_time([recognize(str(path)) for path in present])
-    names = ", ".join(Path(file.path).name for file in files)
+    names = ", ".join(find_place(file.path).name for file in files)
     reason = f"no {METADATA_FILE}" if metadata is None else f"{METADATA_FILE} names no files"
     warning = f"{folder}: {reason}; the files found, in the order of their first messages: {names}"
     return Recording(str(folder), tuple(files), metadata, (warning,))
 
 
-def _listed_files(folder: Path, metadata: BagMetadata, present: list[Path]) -> Recording:
+def _listed_files(folder: Place, metadata: BagMetadata, present: Sequence[Place]) -> Recording:
     paths = [_listed_file(folder, name) for name in metadata.paths]
     files = tuple(recognize(str(path)) for path in paths)
     warnings: list[str] = []
@@ -119,10 +121,10 @@ def _listed_files(folder: Path, metadata: BagMetadata, present: list[Path]) -> R
     return Recording(str(folder), files, metadata, tuple(warnings))
 
 
-def _listed_file(folder: Path, name: str) -> Path:
+def _listed_file(folder: Place, name: str) -> Place:
     """Return a file that metadata.yaml names; rosbag2 leaves it compressed or decompressed when it is interrupted."""
     path = folder / name
-    for candidate in (path, Path(f"{path}{ZSTD_SUFFIX}"), path.with_name(_plain_name(path))):
+    for candidate in (path, path.with_name(path.name + ZSTD_SUFFIX), path.with_name(_plain_name(path))):
         if candidate.is_file():
             return candidate
     raise BagError(
@@ -130,7 +132,7 @@ def _listed_file(folder: Path, name: str) -> Path:
     )
 
 
-def _plain_name(path: Path) -> str:
+def _plain_name(path: Place) -> str:
     return path.name.removesuffix(ZSTD_SUFFIX)
 
 
@@ -142,7 +144,7 @@ def _by_start_time(files: list[RecordedFile]) -> list[RecordedFile]:
     return sorted(files, key=lambda file: times[file.path])  # empty files come last
 
 
-def _metadata_beside(path: Path) -> tuple[BagMetadata | None, tuple[str, ...]]:
+def _metadata_beside(path: Place) -> tuple[BagMetadata | None, tuple[str, ...]]:
     """Return the metadata in the folder of a file, if it is about that file."""
     place = path.parent / METADATA_FILE
     try:
@@ -155,7 +157,7 @@ def _metadata_beside(path: Path) -> tuple[BagMetadata | None, tuple[str, ...]]:
     return (metadata if _plain_name(path) in names else None), ()
 
 
-def _read_metadata(place: Path) -> BagMetadata | None:
+def _read_metadata(place: Place) -> BagMetadata | None:
     if not place.is_file():
         return None
     with open_file(str(place)) as file:

@@ -44,6 +44,8 @@ _FIRST_ROW, _LAST_ROW = -(2**63), 2**63 - 1
 _ERRORS = (sqlite3.Error, UnicodeDecodeError)  # the latter for names of columns
 _DEFINITIONS = "message_definitions"
 _DESCRIPTORS = "protobuf_descriptors"
+JOURNAL_SUFFIXES = ("-wal", "-journal")
+"""What the names of files end with that sqlite leaves beside a database if its recorder is killed."""
 
 
 class SqliteReader:
@@ -134,7 +136,7 @@ class SqliteReader:
     def _recovered(self, path: Path, stack: ExitStack) -> Path:
         """Return the file, or a copy that has what its recorder, which was killed, had not yet written into it."""
         path = path.resolve()  # sqlite looks beside the file that a link leads to
-        beside = [Path(f"{path}{suffix}") for suffix in ("-wal", "-journal")]
+        beside = [Path(f"{path}{suffix}") for suffix in JOURNAL_SUFFIXES]
         journals = [journal for journal in beside if journal.is_file() and journal.stat().st_size]
         if not journals:
             return self._whole_pages(path, stack) if self._salvage else path

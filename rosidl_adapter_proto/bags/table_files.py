@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
+from rosidl_adapter_proto.bags.places import Place
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.transcode.arrow import pa
 
@@ -25,7 +26,7 @@ class TableFile(Protocol):
     def __exit__(self, *exception: object) -> None: ...
 
 
-def format_of(path: Path, file_format: str | None) -> str:
+def format_of(path: Place, file_format: str | None) -> str:
     """Return the format of a file: `parquet`, `arrow` or `csv`.
 
     Args:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rosidl_adapter_proto.bags.conversion import Progress
-from rosidl_adapter_proto.cli.commands.bag import convert as command
+from rosidl_adapter_proto.cli import conversion_report as report
 from tests.bags.recordings import START, STRING, contents, mcap_bytes, strings
 from tests.cli.conftest import Outcome, Run
 
@@ -28,7 +28,7 @@ def convert(run: Run, *arguments: str, wrong: int = 0, count: int = 14, **option
 
 
 def size(path: str) -> str:
-    return command.size_text(Path(path).stat().st_size)
+    return report.size_text(Path(path).stat().st_size)
 
 
 def test_all_is_well(run: Run) -> None:
@@ -132,7 +132,7 @@ def test_plugins(run: Run) -> None:
 def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter([100.0, 110.0, 110.05, 120.0])
     monkeypatch.setattr(time, "monotonic", lambda: next(now))
-    line = command.ProgressLine(next(now))
+    line = report.ProgressLine(next(now))
     line(Progress(0, 4_000_000_000, 0))
     line(Progress(10, 4_000_000_000, 3))  # too soon
     line(Progress(1_000_000_000, 4_000_000_000, 5000))
@@ -155,11 +155,11 @@ def test_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Monkey
     ],
 )
 def test_sizes(size: float, text: str) -> None:
-    assert command.size_text(size) == text
+    assert report.size_text(size) == text
 
 
 @pytest.mark.parametrize(
     ("seconds", "text"), [(0.04, "0.0 s"), (59.9, "59.9 s"), (59.96, "1:00"), (61, "1:01"), (3661, "1:01:01")]
 )
 def test_durations(seconds: float, text: str) -> None:
-    assert command.time_text(seconds) == text
+    assert report.time_text(seconds) == text

@@ -11,14 +11,14 @@ from rosidl_adapter_proto.cli.options import bag_source_options, time_options
 
 
 @click.command("cat")
-@click.argument("bag", type=click.Path(path_type=Path))
+@click.argument("bag", type=click.Path())
 @click.argument("topics", nargs=-1, required=True, metavar="TOPIC...")
 @click.option("--fields", metavar="A.B,C", help="Print only these fields of the messages.")
 @time_options
 @click.option("--limit", type=click.IntRange(min=0), help="Print so many messages at most.")
 @bag_source_options
 def command(
-    bag: Path,
+    bag: str,
     topics: tuple[str, ...],
     fields: str | None,
     start: int | None,

@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import sys
 import time
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
+from rosidl_adapter_proto.cli.conversion_report import ProgressLine, show_outcome, show_outcomes, show_result
 from rosidl_adapter_proto.cli.options import bag_source_options, plugin_option, time_options
 
 if TYPE_CHECKING:
-    from rosidl_adapter_proto.bags.conversion import ConversionResult, Progress
+    from rosidl_adapter_proto.bags.many import BagOutcome, BagTask
+    from rosidl_adapter_proto.bags.workers import Workers
 
 EXIT_INCOMPLETE = 1
-_REDRAWN_AFTER = 0.1  # seconds
-_UNITS = ("B", "kB", "MB", "GB", "TB")
+EXIT_SOME_FAILED = 3
 
 
 @click.command("convert")
-@click.argument("source", metavar="IN", type=click.Path(path_type=Path))
-@click.argument("destination", metavar="OUT", type=click.Path(path_type=Path))
+@click.argument("places", metavar="IN... OUT", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "--list",
+    "listed",
+    type=click.File(),
+    metavar="FILE",
+    help="Convert the bags that are named in a file too, one on each line; - is the standard input.",
+)
 @click.option(
     "--input-serialization-format",
     "--from",
@@ -73,89 +81,111 @@ _UNITS = ("B", "kB", "MB", "GB", "TB")
     metavar="NUMBER",
     help="On how many threads to convert; by default one for each processor.",
 )
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="NUMBER",
+    help="How many files to convert at a time, each in a process of its own, or with --ray in a task; by default one "
+    "after the other in this process, or as many tasks as the cluster has processors.",
+)
+@click.option(
+    "--ray",
+    is_flag=False,
+    flag_value="",
+    metavar="[ADDRESS]",
+    help="Convert on a Ray cluster, each file as a task: the one at ADDRESS, or at $RAY_ADDRESS, or on this machine.",
+)
+@click.option(
+    "--retries",
+    type=click.IntRange(min=0),
+    default=2,
+    show_default=True,
+    metavar="NUMBER",
+    help="How often to try a file again after a process was killed or a connection broke.",
+)
 @plugin_option
 @bag_source_options
-def command(source: Path, destination: Path, **settings: Any) -> int:
-    """Convert a bag to another serialization format.
+def command(
+    places: tuple[str, ...],
+    listed: TextIO | None,
+    jobs: int | None,
+    ray: str | None,
+    retries: int,
+    **options: Any,
+) -> int:
+    """Convert a bag, or many, to another serialization format.
 
     IN is a folder that rosbag2 has recorded, a file of one, or a ROS 1 bag. OUT must not exist: it becomes such a
-    folder, or a single file if its name ends in .mcap or .db3.
+    folder, or a single file if its name ends in .mcap or .db3. Both may be URLs that fsspec knows, such as
+    s3://bucket/drive-12.
+
+    With several IN, a --list or a pattern such as 'bags/*', OUT is the folder that gets a bag for each, with its name.
+    A bag that is there already is not converted again, so the same command goes on where another has ended.
 
     The exit code is 1 if OUT does not have all that it should: messages were left out or copied as they are, since they
-    cannot be converted, or since IN is damaged.
+    cannot be converted, or since IN is damaged. It is 3 if some of many bags could not be converted; they are listed at
+    the end.
     """
+    from rosidl_adapter_proto.bags.many import plan_bags
+    from rosidl_adapter_proto.bags.places import is_pattern
+
+    *sources, destination = places
+    sources += filter(None, map(str.strip, listed or ()))
+    if not sources:
+        raise click.UsageError("Missing argument 'OUT'.")
+    many = listed or len(sources) > 1 or is_pattern(sources[0])
+    tasks = plan_bags(sources, destination, options["storage"]) if many else []
+    with _workers(jobs, ray, options["threads"], retries) as workers:
+        if many:
+            return _convert_bags(tasks, options, workers)
+        return _convert_bag(sources[0], destination, options, workers)
+
+
+def _workers(
+    jobs: int | None, ray: str | None, threads: int | None, retries: int
+) -> AbstractContextManager[Workers]:
+    from rosidl_adapter_proto.bags.workers import Workers, processes
+
+    if ray is not None:
+        from rosidl_adapter_proto.bags.ray_workers import ray_workers
+
+        return ray_workers(ray or None, count=jobs, threads=threads, retries=retries)
+    return processes(jobs, retries=retries) if jobs and jobs > 1 else nullcontext(Workers(retries=retries))
+
+
+def _convert_bag(source: str, destination: str, options: Mapping[str, Any], workers: Workers) -> int:
     from rosidl_adapter_proto.bags.convert import convert_bag
 
     started = time.monotonic()
-    progress = ProgressLine(started) if sys.stderr.isatty() else None
+    line = ProgressLine(started)
+    progress = line if sys.stderr.isatty() else None
     try:
-        result = convert_bag(source, destination, progress=progress, **settings)
+        result = convert_bag(source, destination, workers=workers, progress=progress, **options)
     finally:
-        if progress:
-            progress.clear()
-    for warning in result.warnings:
-        click.echo(f"Warning: {warning}", err=True)
-    _show_failures(result)
-    click.echo(_summary(result, destination, time.monotonic() - started))
+        line.clear()
+    show_result(destination, result, time.monotonic() - started)
     return 0 if result.is_complete else EXIT_INCOMPLETE
 
 
-class ProgressLine:
-    """One line on the terminal, with the rate and the time that is left."""
+def _convert_bags(tasks: Sequence[BagTask], options: Mapping[str, Any], workers: Workers) -> int:
+    from rosidl_adapter_proto.bags.convert import settings_of
+    from rosidl_adapter_proto.bags.many import convert_bags
 
-    def __init__(self, started: float) -> None:
-        self._started = started
-        self._drawn = 0.0
+    started = time.monotonic()
+    line = ProgressLine(started)
+    progress = line.show_bags if sys.stderr.isatty() else None
 
-    def __call__(self, progress: Progress) -> None:
-        now = time.monotonic()
-        if now - self._drawn < _REDRAWN_AFTER:
-            return
-        self._drawn = now
-        rate = progress.done / (now - self._started)
-        left = f", {time_text((progress.total - progress.done) / rate)} left" if rate else ""
-        share = progress.done / progress.total if progress.total else 1.0
-        text = f"{share:4.0%}  {progress.message_count} messages, {size_text(rate)}/s{left}"
-        click.echo(f"\r{text}\x1b[K", nl=False, err=True)
+    def finished(outcome: BagOutcome) -> None:
+        line.clear()
+        show_outcome(outcome)
 
-    def clear(self) -> None:
-        """Take the line away."""
-        if self._drawn:
-            click.echo("\r\x1b[K", nl=False, err=True)
-
-
-def _show_failures(result: ConversionResult) -> None:
-    for failure in result.failures:
-        click.echo(f"Cannot convert {failure}", err=True)
-    more = result.failed_count - len(result.failures)
-    if more > 0:
-        click.echo(f"Cannot convert {more} more messages", err=True)
-
-
-def _summary(result: ConversionResult, destination: Path, seconds: float) -> str:
-    total = result.total
-    counts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in vars(total).items() if count)
-    rate = size_text(result.source_size / seconds)
-    return (
-        f"{destination}: {counts or '0 converted'}; {size_text(result.source_size)} became "
-        f"{size_text(result.size)}, in {time_text(seconds)} ({rate}/s)"
-    )
-
-
-def size_text(size: float) -> str:
-    """Return a number of bytes as people read it."""
-    unit = 0
-    while size >= 1000 and unit < len(_UNITS) - 1:
-        size /= 1000
-        unit += 1
-    digits = 0 if unit == 0 or size >= 99.95 else 1
-    return f"{size:.{digits}f} {_UNITS[unit]}"
-
-
-def time_text(seconds: float) -> str:
-    """Return a duration as people read it."""
-    if seconds < 59.95:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+    try:
+        outcomes = convert_bags(
+            tasks, settings_of(**options), workers=workers, progress=progress, finished=finished
+        )
+    finally:
+        line.clear()
+    show_outcomes(outcomes, time.monotonic() - started)
+    if any(outcome.error for outcome in outcomes):
+        return EXIT_SOME_FAILED
+    return EXIT_INCOMPLETE if any(outcome.is_incomplete for outcome in outcomes) else 0

@@ -19,10 +19,10 @@ _UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
 
 
 @click.command("info")
-@click.argument("bag", type=click.Path(path_type=Path))
+@click.argument("bag", type=click.Path())
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for other programs.")
 @bag_source_options
-def command(bag: Path, as_json: bool, include: tuple[Path, ...], distro: str | None) -> None:
+def command(bag: str, as_json: bool, include: tuple[Path, ...], distro: str | None) -> None:
     """Tell what is in BAG: files, times, topics with their types and counts, and what is odd about it."""
     from rosidl_adapter_proto.bags.bag import open_bag
     from rosidl_adapter_proto.bags.information import bag_information

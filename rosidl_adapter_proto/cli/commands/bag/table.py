@@ -14,11 +14,9 @@ from rosidl_adapter_proto.errors import RequestError
 
 
 @click.command("table")
-@click.argument("bag", type=click.Path(path_type=Path))
+@click.argument("bag", type=click.Path())
 @click.argument("topic")
-@click.option(
-    "--output", "-o", required=True, type=click.Path(path_type=Path), metavar="FILE", help="The table."
-)
+@click.option("--output", "-o", required=True, type=click.Path(), metavar="FILE", help="The table.")
 @click.option(
     "--format",
     "file_format",
@@ -29,9 +27,9 @@ from rosidl_adapter_proto.errors import RequestError
 @time_options
 @bag_source_options
 def command(
-    bag: Path,
+    bag: str,
     topic: str,
-    output: Path,
+    output: str,
     file_format: str | None,
     fields: str | None,
     start: int | None,
