@@ -402,6 +402,7 @@ def changed(file: FileDescriptorProto, **values: Any) -> FileDescriptorProto:
     [
         (cloud(b"\xff"), "its protobuf descriptor is damaged: .*"),
         (cloud(VECTOR, VECTOR), "its protobuf descriptor has two files of the same name"),
+        (cloud(b"\n\3\n\1\x80"), "its protobuf descriptor has a file whose name is not UTF-8"),
         (
             cloud(CLOUD),
             "its protobuf descriptor has no file 'foxglove/Vector.proto', which 'foxglove/PointCloud.proto' imports",
