@@ -12,14 +12,13 @@ from dataclasses import replace
 
 from mcap.records import Channel, Metadata, Schema
 
-from rosidl_adapter_proto.bags.metadata import read_metadata
+from rosidl_adapter_proto.bags.metadata import ROSBAG2, SERIALIZED_METADATA, read_metadata
 from rosidl_adapter_proto.bags.model import CDR, ROS1, RecordedDefinition, Topic
 from rosidl_adapter_proto.bags.qos import numbered_qos
 
 QOS_PROFILES = "offered_qos_profiles"
 TYPE_HASH = "topic_type_hash"
 ROS_TYPE = "ros_type"
-ROSBAG2 = "rosbag2"
 ROS_DEFINITIONS = "rosidl_adapter_proto.ros_definitions"
 """The metadata record with ROS's definitions: by the name of the type, its encoding, a newline, and the text.
 
@@ -148,7 +147,7 @@ def _ros_definitions(metadata: Iterable[Metadata]) -> dict[str, RecordedDefiniti
 
 def _rosbag2_types(metadata: Iterable[Metadata], path: str) -> dict[str, str]:
     """Return the types by the names of the topics, as rosbag2's own description has them; the last one counts."""
-    texts = [record.metadata.get("serialized_metadata", "") for record in metadata if record.name == ROSBAG2]
+    texts = [record.metadata.get(SERIALIZED_METADATA, "") for record in metadata if record.name == ROSBAG2]
     if not texts:
         return {}
     description = read_metadata(texts[-1].encode(), f"{path}, the metadata in it")

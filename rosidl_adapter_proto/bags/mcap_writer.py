@@ -21,6 +21,7 @@ from rosidl_adapter_proto.bags.mcap_topics import (
     write_schema,
 )
 from rosidl_adapter_proto.bags.model import Attachment, RecordedDefinition, Statistics, Topic
+from rosidl_adapter_proto.bags.storage import MCAP
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import RecordIndex, index_records
 
@@ -72,7 +73,7 @@ class McapWriter:
         BagError: There is no such compression.
     """
 
-    storage = "mcap"
+    storage = MCAP
 
     def __init__(self, file: BinaryIO, path: str, *, profile: str, compression: str = "") -> None:
         if compression not in COMPRESSIONS:
