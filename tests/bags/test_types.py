@@ -14,6 +14,7 @@ from rosidl_adapter_proto import TypeRegistry
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition, ros_definition
 from rosidl_adapter_proto.errors import BagError, RequestError, SchemaError
+from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
@@ -452,17 +453,26 @@ def test_topics_that_are_not_of_ros_are_not_generated() -> None:
     assert types(*recorded).recorded_types().types == (TypeName("my_msgs", "msg", "Track"),)
 
 
+@pytest.fixture
+def elsewhere() -> Catalog:
+    return find_catalog((), None)
+
+
+@pytest.fixture
+def whole(elsewhere: Catalog) -> Topic:
+    return in_protobuf(topic(TRACK + HEADER), types(elsewhere=elsewhere))
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_garbage(data: st.DataObject) -> None:
-    whole = in_protobuf(topic(TRACK + HEADER), types())
+def test_garbage(elsewhere: Catalog, whole: Topic, data: st.DataObject) -> None:
     content = bytearray(whole.definition.data)
     for _ in range(data.draw(st.integers(1, 3))):
         at = data.draw(st.integers(0, len(content)))
         content[at : at + data.draw(st.integers(0, 4))] = data.draw(st.binary(max_size=4))
     damaged = Topic(**{**vars(whole), "definition": RecordedDefinition(PROTOBUF, bytes(content))})
     try:
-        schema = types(damaged).schema(damaged)
+        schema = types(damaged, elsewhere=elsewhere).schema(damaged)
         Transcoder(schema.type_description, schema.descriptor)
     except (BagError, SchemaError):
         pass
