@@ -22,7 +22,7 @@ from rosbags.highlevel import AnyReader
 
 from rosidl_adapter_proto.bags.bag import open_bag
 from rosidl_adapter_proto.bags.convert import convert_bag
-from rosidl_adapter_proto.bags.table import table_reader, write_table
+from rosidl_adapter_proto.bags.table import record_batches, write_table
 from rosidl_adapter_proto.transcode import Transcoder
 from rosidl_adapter_proto.transcode.arrow import ColumnReader
 
@@ -112,18 +112,20 @@ def rows(folder: Path, stream: Stream) -> None:
     converted = folder / f"{stream.topic[1:]}_protobuf.mcap"
     convert_bag(path, converted, target_format="protobuf")
     read, written, through_protobuf, framed = seconds(
-        lambda: table_reader(bag, stream.topic).read_all(),
+        lambda: [batch.num_rows for batch in record_batches(bag, stream.topic)],
         to_parquet,
         lambda: handler.list_to_record_batch(messages_of(converted)),
         lambda: data_frame(path, stream.topic),
     )
+    # Large messages are as fast as chunks are decompressed.
+    wanted = "" if stream is SCAN else f">= {WANTED}"
     show(
-        f"{name}, bag to table in memory",
+        f"{name}, bag to record batches",
         "bag of protobuf, mcap library, ptars",
         read,
         through_protobuf,
         COUNT,
-        f">= {WANTED}",
+        wanted,
     )
     show("", "rosbags, pandas.DataFrame", read, framed, COUNT)
     show(f"{name}, bag to Parquet", "rosbags, pandas.DataFrame", written, framed, COUNT)

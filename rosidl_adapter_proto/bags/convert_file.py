@@ -21,7 +21,7 @@ from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.places import Place, written_locally
 from rosidl_adapter_proto.bags.recorded_file import SQLITE3
 from rosidl_adapter_proto.bags.recording import Recording
-from rosidl_adapter_proto.bags.routes import Fate, plan_routes, selected_topics
+from rosidl_adapter_proto.bags.routes import MIXED_FORMATS, Fate, plan_routes, selected_topics
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import StorageReader, StorageWriter
 from rosidl_adapter_proto.bags.types import BagTypes
@@ -93,7 +93,13 @@ def convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileRe
 def _convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileResult:
     salvage = task.settings.on_error is not OnError.STOP
     with task.recording.open(task.index, salvage) as reader, _open_writer(task, reader) as writer:
-        wrong_labels = label_warnings(reader, selected_topics(reader.topics, task.settings))
+        selected = selected_topics(reader.topics, task.settings)
+        others = {topic.serialization_format for topic in selected.values()} - {task.source_format}
+        if others:
+            raise BagError(
+                f"{MIXED_FORMATS} ({reader.path} has {', '.join(sorted(others))}, other files {task.source_format})"
+            )
+        wrong_labels = label_warnings(reader, selected)
         try:
             return _FileConversion(task, reader, writer, wrong_labels).run(progress)
         except BagError as error:
@@ -145,6 +151,7 @@ class _FileConversion:
         self._ledger = Ledger(reader.path, self._routes, reader.statistics.message_counts, settings)
         self._topics: dict[int, Topic] = {}
         self._warnings = list(warnings)
+        self._damage: BagError | None = None
 
     def run(self, progress: Callable[[int, int], None]) -> FileResult:
         """Convert everything."""
@@ -221,7 +228,6 @@ class _FileConversion:
         """Yield the chunks to convert; of a damaged file those before the damage, which are then done first."""
         settings = self._task.settings
         selection = Selection(frozenset(self._selected()), settings.start_time, settings.end_time)
-        self._damage: BagError | None = None
         try:
             yield from self._reader.chunks(selection)
         except BagError as error:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, Selection, Topic
 from rosidl_adapter_proto.bags.storage import StorageReader
+from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.error import RecordsError
 from rosidl_adapter_proto.transcode.records import read_records
 
 if TYPE_CHECKING:
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
 
 _LOOKED_AT = 10
 """How many messages of a topic are looked at: if none of them is what the label says, the label is wrong."""
+
+_CHUNKS_LOOKED_AT = 16
+_MESSAGES_LOOKED_THROUGH = 10_000
+"""How much is looked through for a topic: in a file without an index every chunk may have it."""
 
 # The second byte of CDR, behind a zero (DDS-XTypes 1.3, 7.6.3.1.2): plain and parameter lists, XCDR 1 and 2.
 _CDR_REPRESENTATIONS = frozenset((0, 1, 2, 3, 6, 7, 8, 9, 10, 11))
@@ -42,9 +48,6 @@ def label_warnings(reader: StorageReader, topics: Mapping[int, Topic]) -> list[s
     Args:
         reader: The file.
         topics: The topics to look at, by their ids.
-
-    Raises:
-        BagError: The file is damaged.
     """
     warnings = []
     waiting = {topic_id for topic_id, topic in topics.items() if topic.serialization_format in _CHECKS} & {
@@ -67,13 +70,17 @@ def label_warnings(reader: StorageReader, topics: Mapping[int, Topic]) -> list[s
 
 def _first_messages(reader: StorageReader, topic_ids: Iterable[int]) -> dict[int, list[memoryview]]:
     """Return the first messages of those topics that are in the first chunk that has any; empty if none has."""
-    for chunk in reader.chunks(Selection(topic_ids=frozenset(topic_ids))):
-        records = read_records(records_of(chunk), topic_ids=frozenset(topic_ids))
-        found: dict[int, list[memoryview]] = {}
-        for index, topic_id in enumerate(islice(records.topic_ids, 10_000)):
-            messages = found.setdefault(topic_id, [])
-            if len(messages) < _LOOKED_AT:
-                messages.append(records[index])
-        if found:
-            return found
-    return {}
+    wanted = frozenset(topic_ids)
+    found: dict[int, list[memoryview]] = {}
+    try:
+        for chunk in islice(reader.chunks(Selection(topic_ids=wanted)), _CHUNKS_LOOKED_AT):
+            records = read_records(records_of(chunk), topic_ids=wanted)
+            for index, topic_id in enumerate(islice(records.topic_ids, _MESSAGES_LOOKED_THROUGH)):
+                messages = found.setdefault(topic_id, [])
+                if len(messages) < _LOOKED_AT:
+                    messages.append(records[index])
+            if found:
+                break
+    except (BagError, RecordsError):  # the file is damaged, which those say who read it as a whole
+        pass
+    return found

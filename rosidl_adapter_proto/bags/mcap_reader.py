@@ -43,6 +43,7 @@ class McapReader:
 
     Attributes:
         profile: The profile of the file, such as `ros2`.
+        is_damaged: Whether something could not be read.
 
     Raises:
         BagError: The file is no MCAP file; or it is damaged, and not to be salvaged.
@@ -52,6 +53,7 @@ class McapReader:
 
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path
+        self.is_damaged = False
         self._warnings: dict[str, None] = {}
         self._file = McapFile(file, path)
         self._salvage = salvage
@@ -175,6 +177,7 @@ class McapReader:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
             raise BagError(f"{error}; {_SALVAGE} what is whole") from error
+        self.is_damaged = True
         self._warn(str(error))
 
     def _warn(self, warning: str) -> None:

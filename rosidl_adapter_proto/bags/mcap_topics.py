@@ -14,13 +14,18 @@ from mcap.records import Channel, Metadata, Schema
 
 from rosidl_adapter_proto.bags.metadata import read_metadata
 from rosidl_adapter_proto.bags.model import CDR, ROS1, RecordedDefinition, Topic
+from rosidl_adapter_proto.bags.qos import numbered_qos
 
 QOS_PROFILES = "offered_qos_profiles"
 TYPE_HASH = "topic_type_hash"
 ROS_TYPE = "ros_type"
 ROSBAG2 = "rosbag2"
 ROS_DEFINITIONS = "rosidl_adapter_proto.ros_definitions"
-"""The metadata record with ROS's definitions: by the name of the type, its encoding, a newline, and the text."""
+"""The metadata record with ROS's definitions: by the name of the type, its encoding, a newline, and the text.
+
+Where a file has several definitions of a type, as merged recordings may, the others have the id of the schema behind
+the name of the type: `pkg/msg/Type 2`.
+"""
 
 _PROTOBUF_NAME = re.compile(r"(?P<package>\w+)\.(?P<kind>msg|srv|action)\.pb\.(?P<name>\w+)", re.ASCII)
 _ROS_NAME = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
@@ -52,13 +57,22 @@ def read_topics(
         }
     definitions = _ros_definitions(metadata)
     return {
-        topic_id: (
-            replace(topic, ros_definition=definitions[topic.type_name])
-            if topic.serialization_format != CDR and topic.type_name in definitions
-            else topic
-        )
+        topic_id: _with_ros_definition(topic, channels[topic_id].schema_id, definitions)
         for topic_id, topic in topics.items()
     }
+
+
+def _with_ros_definition(
+    topic: Topic, schema_id: int, definitions: Mapping[str, RecordedDefinition]
+) -> Topic:
+    name = topic.type_name
+    found = definitions.get(other_definition_name(name, schema_id)) or definitions.get(name)
+    return replace(topic, ros_definition=found) if found and topic.serialization_format != CDR else topic
+
+
+def other_definition_name(type_name: str, schema_id: int) -> str:
+    """Return the name in `ROS_DEFINITIONS` for a definition that is not the first of its type."""
+    return f"{type_name} {schema_id}"
 
 
 def write_schema(topic: Topic) -> Schema:
@@ -116,7 +130,7 @@ def _read_topic(channel: Channel, schema: Schema | None) -> Topic:
         definition=RecordedDefinition(schema.encoding, schema.data) if schema else RecordedDefinition(),
         schema_name=schema_name,
         type_hash=type_hash,
-        qos_profiles=qos_profiles,
+        qos_profiles=numbered_qos(qos_profiles),
         metadata=rest,
     )
 

@@ -15,11 +15,12 @@ from rosidl_adapter_proto.bags.compression import COMPRESSIONS, compress
 from rosidl_adapter_proto.bags.mcap_records import CHUNK_HEAD, MAGIC, RECORD_HEAD, write
 from rosidl_adapter_proto.bags.mcap_topics import (
     ROS_DEFINITIONS,
+    other_definition_name,
     write_channel,
     write_ros_definition,
     write_schema,
 )
-from rosidl_adapter_proto.bags.model import Attachment, Statistics, Topic
+from rosidl_adapter_proto.bags.model import Attachment, RecordedDefinition, Statistics, Topic
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import RecordIndex, index_records
 
@@ -83,7 +84,7 @@ class McapWriter:
         self._topics: dict[int, Topic] = {}
         self._new_topics: dict[int, Topic] = {}
         self._schema_ids: dict[tuple[str, str, bytes], int] = {}
-        self._defined_types: set[str] = set()
+        self._definitions: dict[str, RecordedDefinition] = {}  # by their names in ROS_DEFINITIONS
         self._summary: dict[Opcode, bytearray] = {group: bytearray() for group in _GROUPS}
         self._statistics = records.Statistics(0, 0, {}, 0, 0, 0, 0, 0, 0)
         self._write(MAGIC)
@@ -234,15 +235,19 @@ class McapWriter:
         """Write the topics that were added since the last chunk, and ROS's definitions of their types."""
         definitions = {}
         for topic_id, topic in self._new_topics.items():
-            channel = write(write_channel(topic, topic_id, self._write_schema(topic)))
+            schema_id = self._write_schema(topic)
+            channel = write(write_channel(topic, topic_id, schema_id))
             self._write(channel)
             self._summary[Opcode.CHANNEL] += channel
             self._statistics.channel_count += 1
-            if topic.ros_definition.encoding and topic.type_name not in self._defined_types:
-                definitions[topic.type_name] = write_ros_definition(topic.ros_definition)
+            name, definition = topic.type_name, topic.ros_definition
+            if self._definitions.get(name, definition) != definition:
+                name = other_definition_name(name, schema_id)
+            if definition.encoding and name not in self._definitions:
+                self._definitions[name] = definition
+                definitions[name] = write_ros_definition(definition)
         if definitions:
             self.add_metadata(ROS_DEFINITIONS, definitions)
-            self._defined_types.update(definitions)
         self._new_topics = {}
 
     def _write_schema(self, topic: Topic) -> int:

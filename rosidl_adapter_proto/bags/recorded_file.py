@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import zstandard
 
@@ -27,10 +27,8 @@ from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteRea
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
 from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.error import RecordsError
 from rosidl_adapter_proto.transcode.records import Records, pack_records, read_records
-
-if TYPE_CHECKING:
-    from typing_extensions import Buffer
 
 MCAP = "mcap"
 SQLITE3 = "sqlite3"
@@ -117,12 +115,15 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
         BagError: It cannot be read.
     """
     with ExitStack() as stack:
+        damage = None
         try:
-            path = _decompressed(file.path, stack) if file.compressed else file.path
+            path, damage = _decompressed(file.path, stack) if file.compressed else (file.path, None)
+            if damage and not salvage:
+                raise damage
             reader = stack.enter_context(_OPENERS[file.storage](path, file.path, salvage, stack))
         except OSError as error:  # also of temporary files, such as that the disk is full
             raise BagError(f"{file.path}: cannot be opened: {error}") from None
-        return _OpenedFile(reader, metadata, stack)
+        return _OpenedFile(reader, metadata, stack, salvage, damage)
 
 
 def create_file(
@@ -154,20 +155,26 @@ def create_file(
     return SqliteWriter(path, ros_distro=ros_distro)
 
 
-def _decompressed(path: str, stack: ExitStack) -> str:
-    """Return a temporary file with what another has compressed."""
+def _decompressed(path: str, stack: ExitStack) -> tuple[str, BagError | None]:
+    """Return a temporary file with what another has compressed, and why that is not all of it."""
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-"))
     target = Path(folder, find_place(path).name.removesuffix(ZSTD_SUFFIX))
     room = shutil.disk_usage(folder).free - _SPARE_SPACE
     with open_file(path) as source, target.open("wb") as file:
-        for piece in _decompressed_pieces(source, path):
-            room -= len(piece)
-            if room < 0:
-                raise BagError(
-                    f"{path}: too large to be decompressed in {folder}; set TMPDIR to a larger disk"
-                )
-            file.write(piece)
-    return str(target)
+        try:
+            for piece in _decompressed_pieces(source, path):
+                room -= len(piece)
+                if room < 0:
+                    reason = f"too large to be decompressed in {folder}; set TMPDIR to a larger disk"
+                    raise BagError(f"{path}: {reason}")
+                file.write(piece)
+        except _DamagedFile as error:
+            return str(target), error
+    return str(target), None
+
+
+class _DamagedFile(BagError):
+    """A compressed file is damaged; what is before that is whole."""
 
 
 def _decompressed_pieces(source: BinaryIO, path: str) -> Iterator[bytes]:
@@ -180,10 +187,12 @@ def _decompressed_pieces(source: BinaryIO, path: str) -> Iterator[bytes]:
             try:
                 yield frame.decompress(data)
             except zstandard.ZstdError as error:
-                raise BagError(f"{path}: damaged zstd before byte {source.tell()}: {error}") from None
+                raise _DamagedFile(f"{path}: damaged zstd before byte {source.tell()}: {error}") from None
             data = frame.unused_data if frame.eof else b""
     if not frame.eof:
-        raise BagError(f"{path}: cut off: its compressed data does not end at its last byte, {source.tell()}")
+        raise _DamagedFile(
+            f"{path}: cut off: its compressed data does not end at its last byte, {source.tell()}"
+        )
 
 
 def _open_mcap(path: str, name: str, salvage: bool, stack: ExitStack) -> StorageReader:
@@ -211,12 +220,21 @@ _OPENERS: Mapping[str, Callable[[str, str, bool, ExitStack], StorageReader]] = {
 class _OpenedFile:
     """A file of a recording, with what only metadata.yaml says of its topics; see `StorageReader`."""
 
-    def __init__(self, reader: StorageReader, metadata: BagMetadata | None, stack: ExitStack) -> None:
+    def __init__(
+        self,
+        reader: StorageReader,
+        metadata: BagMetadata | None,
+        stack: ExitStack,
+        salvage: bool,
+        damage: BagError | None,
+    ) -> None:
         self.path = reader.path
         self.storage = reader.storage
         self.metadata: Sequence[tuple[str, Mapping[str, str]]] = reader.metadata
         self.topics, self._contradictions = _with_metadata(reader, metadata)
-        metadata = metadata or _inner_metadata(reader)
+        self._salvage = salvage
+        self._damages = {} if damage is None else {str(damage): None}
+        metadata = metadata or self._inner_metadata(reader)
         self._messages_compressed = metadata is not None and metadata.compression_mode == "MESSAGE"
         if metadata is not None and self._messages_compressed and metadata.compression_format != "zstd":
             known = f"compressed with {metadata.compression_format!r}; only zstd is known"
@@ -230,7 +248,11 @@ class _OpenedFile:
 
     @property
     def warnings(self) -> Sequence[str]:
-        return [*self._reader.warnings, *self._contradictions]
+        return [*self._damages, *self._reader.warnings, *self._contradictions]
+
+    @property
+    def is_damaged(self) -> bool:
+        return bool(self._damages) or self._reader.is_damaged
 
     def attachments(self) -> Iterator[Attachment]:
         return self._reader.attachments()
@@ -241,25 +263,66 @@ class _OpenedFile:
         for chunk in self._reader.chunks(selection, in_time_order=in_time_order):
             if self._messages_compressed:
                 # In the order of time, pieces of a chunk would have to stand between those of others.
-                yield from _with_plain_messages(
+                yield from self._with_plain_messages(
                     chunk, selection, MAXIMUM_CHUNK_SIZE if in_time_order else _PIECE_SIZE
                 )
             else:
                 yield chunk
+
+    def _with_plain_messages(
+        self, chunk: StoredChunk, selection: Selection, piece_size: int
+    ) -> Iterator[StoredChunk]:
+        """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
+        try:
+            records = read_records(
+                records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time
+            )
+        except (BagError, RecordsError):
+            yield chunk  # it is damaged, which those who look into it will find as well
+            return
+        size = 0
+        messages: dict[int, bytes] = {}
+        for index in range(len(records)):
+            try:
+                messages[index] = _decompressed_message(records[index])
+            except zstandard.ZstdError as error:
+                topic = self.topics[records.topic_ids[index]].name
+                self._damaged(
+                    f"{chunk.where}: a message of {topic}, recorded at {records.log_times[index]}, cannot be "
+                    f"decompressed: {error}"
+                )
+                continue
+            size += len(messages[index])
+            if size >= piece_size:
+                yield _plain_chunk(chunk, records, messages)
+                size, messages = 0, {}
+        if messages:
+            yield _plain_chunk(chunk, records, messages)
+
+    def _damaged(self, reason: str) -> None:
+        """Raise an error, unless what can be read is to be read."""
+        if not self._salvage:
+            raise BagError(f"{reason}; `--on-error skip` leaves such messages out")
+        self._damages[reason] = None
+
+    def _inner_metadata(self, reader: StorageReader) -> BagMetadata | None:
+        """Return what rosbag2 wrote into a file about its bag; the last one counts."""
+        texts = [
+            values["serialized_metadata"] for _, values in reader.metadata if "serialized_metadata" in values
+        ]
+        if not texts:
+            return None
+        try:
+            return read_metadata(texts[-1].encode(), f"{reader.path}, the metadata in it")
+        except BagError as error:
+            self._contradictions.append(f"{error} (read without it)")
+            return None
 
     def __enter__(self) -> _OpenedFile:
         return self
 
     def __exit__(self, *exception: object) -> None:
         self._stack.close()
-
-
-def _inner_metadata(reader: StorageReader) -> BagMetadata | None:
-    """Return what rosbag2 wrote into a file about its bag; the last one counts."""
-    texts = [
-        values["serialized_metadata"] for _, values in reader.metadata if "serialized_metadata" in values
-    ]
-    return read_metadata(texts[-1].encode(), f"{reader.path}, the metadata in it") if texts else None
 
 
 def _with_metadata(
@@ -288,37 +351,26 @@ def _with_metadata(
     return topics, contradictions
 
 
-def _with_plain_messages(chunk: StoredChunk, selection: Selection, piece_size: int) -> Iterator[StoredChunk]:
-    """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
-    records = read_records(records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time)
-    first = 0
-    size = 0
-    messages: list[Buffer] = []
-    for index in range(len(records)):
-        messages.append(_decompressed_message(records, index, chunk.where))
-        size += memoryview(messages[-1]).nbytes
-        if size >= piece_size or index == len(records) - 1:
-            yield _plain_chunk(chunk, records, first, messages)
-            first, size, messages = index + 1, 0, []
-
-
-def _decompressed_message(records: Records, index: int, where: str) -> bytes:
-    data = records[index]
-    try:
-        size = zstandard.frame_content_size(data)
-        if not 0 <= size <= MAXIMUM_CHUNK_SIZE:
-            raise zstandard.ZstdError(f"its size would be {size} bytes")
-        plain: bytes = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
-    except zstandard.ZstdError as error:
-        raise BagError(f"{where}: message {index} of the chunk: cannot be decompressed: {error}") from None
+def _decompressed_message(data: memoryview) -> bytes:
+    """Return a message decompressed, or raise a ZstdError."""
+    size = zstandard.frame_content_size(data)
+    if size < 0:
+        raise zstandard.ZstdError("it does not say how large it is")
+    if size > MAXIMUM_CHUNK_SIZE:
+        raise zstandard.ZstdError(f"its size would be {size} bytes")
+    plain: bytes = zstandard.ZstdDecompressor().decompress(data, allow_extra_data=False)
     return plain
 
 
-def _plain_chunk(chunk: StoredChunk, records: Records, first: int, messages: list[Buffer]) -> StoredChunk:
-    chosen = slice(first, first + len(messages))
-    times = array("Q", records.log_times[chosen])
+def _plain_chunk(chunk: StoredChunk, records: Records, messages: Mapping[int, bytes]) -> StoredChunk:
+    """Return a chunk with messages, by their places in its records."""
+    times = array("Q", (records.log_times[index] for index in messages))
     data = pack_records(
-        records.topic_ids[chosen], records.sequences[chosen], times, records.publish_times[chosen], messages
+        array("H", (records.topic_ids[index] for index in messages)),
+        array("I", (records.sequences[index] for index in messages)),
+        times,
+        array("Q", (records.publish_times[index] for index in messages)),
+        list(messages.values()),
     )
     return StoredChunk(
         chunk.where, data, "", len(data), 0, min(times), max(times), len(messages), chunk.position

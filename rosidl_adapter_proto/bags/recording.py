@@ -78,6 +78,8 @@ def find_recording(path: str) -> Recording:
         return _folder(place)
     if not place.exists():
         raise BagError(f"{path}: no such file or folder")
+    if not place.is_file():
+        raise BagError(f"{path}: neither a file nor a folder, but a pipe or a device; copy it to a file")
     file = recognize(path)
     metadata, warnings = _metadata_beside(place)
     return Recording(path, (file,), metadata, warnings)

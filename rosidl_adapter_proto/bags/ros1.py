@@ -126,15 +126,18 @@ class Ros1Reader:
         self.path = path
         self.metadata: Sequence[tuple[str, Mapping[str, str]]] = ()
         self.warnings: list[str] = []
+        self.is_damaged = False
         self._file = file
         self._source = Source(path, file.seek(0, 2), self._read)
         self._contents = _Contents()
         index = self._read_header()
-        self._tolerant = salvage or not index
-        if index:
-            self._read_index(index)
-        else:
+        self._tolerant = not index
+        if not index:
             self._warn(f"{path}: without an index, as its recorder did not finish; read from its beginning")
+        elif not self._read_index(index, salvage):
+            index = 0
+        self._tolerant |= salvage
+        if not index:
             self._scan()
         self.topics: Mapping[int, Topic] = self._contents.topics
         self.statistics = Statistics(self._contents.counts, *(self._contents.times or (0, 0)))
@@ -224,6 +227,7 @@ class Ros1Reader:
         """Say what is damaged, instead of raising an error, if the bag is to be salvaged or not finished anyway."""
         if not self._tolerant:
             raise error
+        self.is_damaged = True
         if len(self.warnings) < _MAXIMUM_WARNING_COUNT:
             self._warn(f"{error}; {consequence}")
 
@@ -252,7 +256,19 @@ class Ros1Reader:
             raise BagError(f"{self.path}: encrypted with {encryptor}; `rosbag decrypt` of ROS 1 decrypts it")
         return record.number(b"index_pos", 8)
 
-    def _read_index(self, start: int) -> None:
+    def _read_index(self, start: int, salvage: bool) -> bool:
+        """Return whether the index says what is in the bag; to salvage a bag, a damaged one does not."""
+        try:
+            self._add_index(start)
+        except BagError as error:
+            if not salvage:
+                raise BagError(f"{error}; `--on-error skip` reads what is whole") from error
+            self._contents = _Contents()
+            self._tolerant = True
+            self._tolerate(error, "read from its beginning, without the index")
+        return not self.is_damaged
+
+    def _add_index(self, start: int) -> None:
         if start > self._source.size:
             size = self._source.size
             raise BagError(

@@ -7,6 +7,7 @@ files in the wild mix them. Protobuf bags have a table of our own, `protobuf_des
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -64,6 +65,7 @@ class SqliteReader:
     def __init__(self, file_path: str, path: str = "", *, salvage: bool = False) -> None:
         self.path = path = path or file_path
         self.warnings: list[str] = []
+        self.is_damaged = False
         self._salvage = salvage
         with ExitStack() as stack:
             self._connection = self._open(Path(file_path), stack)
@@ -94,10 +96,12 @@ class SqliteReader:
             groups = [(row[1], 1, row[2], row[2]) for rows in self._batches(EVERYTHING) for row in rows]
         counts = dict.fromkeys(self.topics, 0)
         for topic, count, _, _ in groups:
-            if topic not in self._topic_ids:
-                raise BagError(f"{self.path}: table messages: topic_id {topic!r} is not in the table topics")
-            counts[self._topic_ids[topic]] += count
-        times = [time for group in groups for time in group[2:] if isinstance(time, int)]
+            if topic in self._topic_ids:
+                counts[self._topic_ids[topic]] += count
+            else:
+                reason = f"{self.path}: table messages: topic_id {topic!r} is not in the table topics"
+                self._damaged(reason, f"{reason}; {count} rows are left out")
+        times = [time for group in groups for time in group[2:] if isinstance(time, int) and time >= 0]
         return Statistics(counts, min(times, default=0), max(times, default=0))
 
     def attachments(self) -> Iterator[Attachment]:
@@ -114,7 +118,7 @@ class SqliteReader:
         """
         done = 0
         for rows in self._batches(selection, in_time_order):
-            yield self._chunk(rows, done)
+            yield from self._chunk(rows, done)
             done += len(rows)
 
     def _open(self, path: Path, stack: ExitStack) -> sqlite3.Connection:
@@ -124,15 +128,18 @@ class SqliteReader:
         place = f"file:{quote(str(self._recovered(path, stack).absolute()))}?mode=ro&immutable=1"
         connection = sqlite3.connect(place, uri=True, check_same_thread=False)
         stack.callback(connection.close)
+        if self._salvage:  # else sqlite reads nothing of a file that has lost its end
+            connection.execute("PRAGMA writable_schema = ON")
         connection.text_factory = bytes  # names may be anything; they are decoded with errors that say where
         return connection
 
     def _recovered(self, path: Path, stack: ExitStack) -> Path:
         """Return the file, or a copy that has what its recorder, which was killed, had not yet written into it."""
+        path = path.resolve()  # sqlite looks beside the file that a link leads to
         beside = [Path(f"{path}{suffix}") for suffix in JOURNAL_SUFFIXES]
         journals = [journal for journal in beside if journal.is_file() and journal.stat().st_size]
         if not journals:
-            return path
+            return self._whole_pages(path, stack) if self._salvage else path
         names = " and ".join(journal.name for journal in journals)
         self.warnings.append(
             f"{self.path}: its recorder did not finish; {names} beside it was read too, from a copy"
@@ -151,11 +158,30 @@ class SqliteReader:
             connection.close()
         return folder / path.name
 
+    def _whole_pages(self, path: Path, stack: ExitStack) -> Path:
+        """Return the file, or a copy without the page in which it was cut off: sqlite would fill it up with zeros."""
+        with path.open("rb") as file:
+            head, size = file.read(18), path.stat().st_size
+            page_size = int.from_bytes(head[16:18], "big")
+            page_size = (
+                2**16 if page_size == 1 else max(page_size, 512)
+            )  # https://sqlite.org/fileformat.html#page_size
+            if size % page_size == 0:
+                return path
+            self._note(
+                f"{self.path}: cut off in the page of {page_size} bytes that is its last; it is left out"
+            )
+            copy = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-")), path.name)
+            shutil.copyfile(path, copy)
+        os.truncate(copy, size - size % page_size)
+        return copy
+
     def _query(self, query: str) -> list[tuple[Any, ...]]:
         try:
             return self._connection.execute(query).fetchall()
         except _ERRORS as error:
-            raise BagError(f"{self.path}: {_reason(error)}") from None
+            advice = "; `--on-error skip` reads what is whole" if "malformed" in str(error) else ""
+            raise BagError(f"{self.path}: {_reason(error)}{advice}") from None
 
     def _tables(self) -> list[str]:
         names = [name for (name,) in self._query("SELECT name FROM sqlite_master WHERE type = 'table'")]
@@ -290,7 +316,7 @@ class SqliteReader:
                 continue
             skipped = self._damaged_rows(query, first, values)
             last = f"to {first + skipped - 1}" if skipped else "on"
-            self.warnings.append(f"{self.path}: table messages, rows {first} {last} are left out: {reason}")
+            self._note(f"{self.path}: table messages, rows {first} {last} are left out: {reason}")
             if not skipped:
                 return
             first += skipped
@@ -319,30 +345,53 @@ class SqliteReader:
             return None
         return found
 
-    def _chunk(self, rows: list[_Row], done: int) -> StoredChunk:
+    def _chunk(self, rows: list[_Row], done: int) -> Iterator[StoredChunk]:
+        """Yield a chunk of some rows, if there are any but wrong ones."""
         where = f"{self.path}, table messages, rows {rows[0][0]} to {rows[-1][0]}"
-        _, topics, times, messages = zip(*rows, strict=True)
         try:
-            log_times = array("Q", times)
-            topic_ids = array("H", [self._topic_ids[topic] for topic in topics])
-            data = pack_records(topic_ids, array("I", bytes(4 * len(rows))), log_times, log_times, messages)
+            chunk = self._packed(rows, where)
         except (TypeError, OverflowError, KeyError):
-            raise self._wrong_row(rows, done) from None
+            wrong = {index: reason for index, row in enumerate(rows) if (reason := self._reason_against(row))}
+            first, reason = next(iter(wrong.items()))
+            reason = f"{self.path}: table messages, row {rows[first][0]}: {reason}"
+            rest = "" if len(wrong) == 1 else f", and {len(wrong) - 1} that are wrong up to row {rows[-1][0]}"
+            self._damaged(
+                f"{reason}; {done + first} messages before it were read", f"{reason}; it is left out{rest}"
+            )
+            rows = [row for index, row in enumerate(rows) if index not in wrong]
+            if not rows:
+                return
+            chunk = self._packed(rows, where)
+        yield chunk
+
+    def _packed(self, rows: list[_Row], where: str) -> StoredChunk:
+        _, topics, times, messages = zip(*rows, strict=True)
+        log_times = array("Q", times)
+        topic_ids = array("H", [self._topic_ids[topic] for topic in topics])
+        data = pack_records(topic_ids, array("I", bytes(4 * len(rows))), log_times, log_times, messages)
         return StoredChunk(where, data, "", len(data), 0, min(log_times), max(log_times), len(rows))
 
-    def _wrong_row(self, rows: list[_Row], done: int) -> BagError:
-        for number, (row, topic, time, data) in enumerate(rows):
-            reason = ""
-            if topic not in self._topic_ids:
-                reason = f"topic_id {topic!r} is not in the table topics"
-            elif not isinstance(time, int) or time < 0:
-                reason = f"timestamp {time!r} is not a time in nanoseconds since 1970"
-            elif not isinstance(data, bytes):
-                reason = f"data is {'missing' if data is None else repr(data)}, not bytes"
-            if reason:
-                read = f"{done + number} messages before it were read"
-                return BagError(f"{self.path}: table messages, row {row}: {reason}; {read}")
-        raise AssertionError("a row that cannot be packed is wrong")
+    def _reason_against(self, row: _Row) -> str:
+        """Return what is wrong with a row; empty if nothing is."""
+        _, topic, time, data = row
+        if topic not in self._topic_ids:
+            return f"topic_id {topic!r} is not in the table topics"
+        if not isinstance(time, int) or time < 0:
+            return f"timestamp {time!r} is not a time in nanoseconds since 1970"
+        if not isinstance(data, bytes):
+            return f"data is {'missing' if data is None else repr(data)}, not bytes"
+        return ""
+
+    def _damaged(self, reason: str, warning: str) -> None:
+        """Raise an error, unless what can be read is to be read: then note it."""
+        if not self._salvage:
+            raise BagError(reason)
+        self._note(warning)
+
+    def _note(self, warning: str) -> None:
+        self.is_damaged = True
+        if warning not in self.warnings:
+            self.warnings.append(warning)
 
 
 def definition_names(type_name: str) -> list[str]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.metadata import WRITTEN_VERSION
-from rosidl_adapter_proto.bags.model import PROTOBUF, Attachment, Statistics, Topic
+from rosidl_adapter_proto.bags.model import PROTOBUF, Attachment, RecordedDefinition, Statistics, Topic
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.bags.sqlite3_reader import definition_names
 from rosidl_adapter_proto.bags.storage import PackedChunk
@@ -72,8 +72,10 @@ class SqliteWriter:
     def __init__(self, path: str, *, ros_distro: str = "") -> None:
         self.path = path
         self._topics: dict[int, Topic] = {}
-        self._described: set[str] = set()  # types whose descriptors were written
-        self._defined: set[str] = set()  # types whose definitions were written
+        self._described: dict[str, Topic] = {}  # the topics of which descriptors were written, by their types
+        self._defined: dict[str, tuple[Topic, RecordedDefinition]] = (
+            {}
+        )  # and of which definitions were written
         self._counts: Counter[int] = Counter()
         self._times: tuple[int, int] | None = None
         try:
@@ -112,7 +114,7 @@ class SqliteWriter:
             "INSERT INTO topics VALUES (?, ?, ?, ?, ?, ?)",
             topic_id,
             topic.name,
-            topic.type_name,
+            _type_name(topic),
             topic.serialization_format,
             numbered_qos(topic.qos_profiles),
             topic.type_hash,
@@ -167,18 +169,36 @@ class SqliteWriter:
         self._connection.close()
 
     def _add_definitions(self, topic: Topic) -> None:
-        definition = topic.definition
-        if topic.serialization_format == PROTOBUF:
-            definition = topic.ros_definition
-            if topic.type_name not in self._described:
-                self._described.add(topic.type_name)
-                self._execute(_DESCRIPTORS)
-                row = topic.type_name, topic.schema_name, topic.definition.data
-                self._execute("INSERT INTO protobuf_descriptors VALUES (?, ?, ?)", *row)
+        is_protobuf = topic.serialization_format == PROTOBUF
+        definition = topic.ros_definition if is_protobuf else topic.definition
+        if is_protobuf:
+            self._add_descriptor(topic)
         name = definition_names(topic.type_name)[-1]
         if definition.encoding and name not in self._defined:
-            self._defined.add(name)
+            self._defined[name] = topic, definition
             self._execute(_ADD_DEFINITION, name, definition.encoding, definition.data, topic.type_hash)
+        elif definition.encoding and not is_protobuf:  # of which the descriptors say more
+            other, defined = self._defined[name]
+            # Not so for the event of a service, and its request; and a hash says all of the type, but no comments.
+            same_type = topic.type_name == other.type_name
+            if same_type and definition != defined and not topic.type_hash == other.type_hash != "":
+                raise self._no_room(topic, other)
+
+    def _add_descriptor(self, topic: Topic) -> None:
+        name = _type_name(topic)
+        if name not in self._described:
+            self._described[name] = topic
+            self._execute(_DESCRIPTORS)
+            row = name, topic.schema_name, topic.definition.data
+            self._execute("INSERT INTO protobuf_descriptors VALUES (?, ?, ?)", *row)
+        elif topic.definition != self._described[name].definition:
+            raise self._no_room(topic, self._described[name])
+
+    def _no_room(self, topic: Topic, other: Topic) -> BagError:
+        return BagError(
+            f"{self.path}: {topic.name} and {other.name} have other definitions of {_type_name(topic)}, and sqlite3 "
+            "has room for one; write MCAP instead"
+        )
 
     def _execute(self, statement: str, *values: object) -> None:
         with self._errors():
@@ -194,3 +214,8 @@ class SqliteWriter:
             ) from None
         except sqlite3.Error as error:
             raise BagError(f"{self.path}: sqlite3 says: {error}") from None
+
+
+def _type_name(topic: Topic) -> str:
+    """Return the ROS type of a topic; that of protobuf, if it has no other."""
+    return topic.type_name or topic.schema_name

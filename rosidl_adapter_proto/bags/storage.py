@@ -25,6 +25,7 @@ class StorageReader(Protocol):
         attachments: The files inside it, which are few.
         metadata: Whatever else the storage keeps, by name, such as what rosbag2 and a recorder wrote about the bag.
         warnings: What is odd about the file, for people, such as that it has no summary. Reading chunks may add to it.
+        is_damaged: Whether `warnings` has something that could not be read. Reading chunks may find it.
     """
 
     @property
@@ -39,6 +40,8 @@ class StorageReader(Protocol):
     def metadata(self) -> Sequence[tuple[str, Mapping[str, str]]]: ...
     @property
     def warnings(self) -> Sequence[str]: ...
+    @property
+    def is_damaged(self) -> bool: ...
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files inside it, one at a time, since they may be large."""

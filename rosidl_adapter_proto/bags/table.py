@@ -170,14 +170,26 @@ class _Rows:
         """Yield record batches of runs of messages."""
         before: ColumnReader | None = None
         for file, run in runs:
-            for topic_id, indexes in _of_one_topic_each(run):
-                reader = self._readers[file.path, topic_id]
+            for reader, indexes in self._parts(file.path, run):
                 if before is not None and before is not reader and len(before):
                     yield self._record_batch(before)
                 before = reader
                 yield from self._append(reader, file.path, run.records, indexes)
         if before is not None and len(before):
             yield self._record_batch(before)
+
+    def _parts(self, path: str, run: Run) -> Iterator[tuple[ColumnReader, Sequence[int]]]:
+        """Yield the parts of a run, and what reads each: mostly one part, since topics seldom change their type."""
+        first_reader, *others = set(self._readers.values())
+        if not others:
+            yield first_reader, run.indexes
+            return
+        readers = [self._readers[path, run.records.topic_ids[index]] for index in run.indexes]
+        first = 0
+        for last in range(1, len(readers) + 1):
+            if last == len(readers) or readers[last] is not readers[first]:
+                yield readers[first], run.indexes[first:last]
+                first = last
 
     def _append(
         self, reader: ColumnReader, path: str, records: Records, indexes: Sequence[int]
@@ -250,19 +262,6 @@ def _free_name(name: str, taken: Collection[str]) -> str:
     while name in taken:
         name = f"_{name}"
     return name
-
-
-def _of_one_topic_each(run: Run) -> Iterator[tuple[int, Sequence[int]]]:
-    """Yield the parts of a run that have one topic id each: mostly all of it."""
-    topic_ids, indexes = run.records.topic_ids, run.indexes
-    if len(set(topic_ids)) == 1:
-        yield topic_ids[0], indexes
-        return
-    first = 0
-    for position in range(1, len(indexes) + 1):
-        if position == len(indexes) or topic_ids[indexes[position]] != topic_ids[indexes[first]]:
-            yield topic_ids[indexes[first]], indexes[first:position]
-            first = position
 
 
 def _chosen(numbers: memoryview, indexes: Sequence[int], width: int = 1) -> memoryview:

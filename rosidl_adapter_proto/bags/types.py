@@ -1,8 +1,7 @@
 """The types of a recording: what its messages are in ROS and in protobuf, without generated code.
 
 Definitions come from the recording itself. What it does not define comes from where `generate` finds definitions:
-folders that the user names, what is installed, and the embedded store. Where the recording does not say which version
-of a type it has, a folder that the user names counts more than its definition, which may be a mistake.
+folders that the user names, what is installed, and the embedded store.
 """
 
 from __future__ import annotations
@@ -64,8 +63,7 @@ class BagTypes:
 
     Args:
         topics: The topics of the recording.
-        include: Folders that have what the recording does not define, or does not define as it should: they come first
-            for types that it has no type hash of.
+        include: Folders that have what the recording does not define.
         distro: The distribution of the embedded store.
         elsewhere: What `include` and `distro` stand for, if it was found before: finding it takes long.
 
@@ -82,14 +80,7 @@ class BagTypes:
         elsewhere: Catalog | None = None,
     ) -> None:
         self.warnings: list[str] = []
-        include = tuple(include)
         self._elsewhere = elsewhere or find_catalog(include, distro)
-        self._named = {
-            name
-            for source in self._elsewhere.sources[: len(include)]
-            for each in source.packages.values()
-            for name in each
-        }
         self._schemas: dict[Hashable, Schema] = {}
         self._topics = tuple(topics)
 
@@ -170,8 +161,7 @@ class BagTypes:
         foreign = [each for each in _definitions_of(schema) if each.name not in own]
         origins = ", ".join(f"{each.name} from {each.origin}" for each in foreign)
         if not topic.type_hash.startswith(_KNOWN_HASH):
-            is_chosen = self._is_named(topic, TypeName.parse(schema.type_name))
-            if not is_chosen and any(each.origin != ORIGIN for each in foreign):
+            if any(each.origin != ORIGIN for each in foreign):
                 self._warn(
                     f"{schema.type_name}: the recording neither defines all of it nor says which version it has: "
                     f"{origins}"
@@ -187,17 +177,11 @@ class BagTypes:
             self.warnings.append(text)
 
     def _definitions(self, topic: Topic) -> Package:
-        """Return the definitions that the recording has for a topic; none if it has none, or the user has others."""
+        """Return the definitions that the recording has for a topic; none if it has none that could be read."""
         name = _ros_type(topic)
-        if self._is_named(topic, name):
-            return {}
         definitions = _recorded_definitions(topic, name)
         is_blank = not _recorded(topic).data.strip()
         return {} if is_blank and not self._is_empty_message(topic, name, definitions) else definitions
-
-    def _is_named(self, topic: Topic, name: TypeName) -> bool:
-        """Tell whether a folder that the user names decides about a type."""
-        return interface_base(name) in self._named and not topic.type_hash.startswith(_KNOWN_HASH)
 
     def _is_empty_message(self, topic: Topic, name: TypeName, definitions: Package) -> bool:
         """Tell whether a text without fields is the definition of a message without fields, or only left out."""

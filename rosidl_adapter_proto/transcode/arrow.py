@@ -38,8 +38,11 @@ __all__ = ["MAXIMUM_BYTES", "MAXIMUM_ROWS", "ColumnReader", "pa"]
 MAXIMUM_ROWS = 2**17
 """So many rows a record batch has, unless somebody asks for others."""
 
-MAXIMUM_BYTES = 64 * 2**20
-"""A record batch ends with the row with which it has so many bytes, unless somebody asks for others."""
+MAXIMUM_BYTES = 16 * 2**20
+"""A record batch ends with the row with which it has so many bytes, unless somebody asks for others.
+
+Memory for larger ones comes from the system anew each time, and finding it takes longer than filling it.
+"""
 
 _NUMBERS = {
     CdrForm.BOOLEAN: pa.bool_(),

@@ -17,7 +17,7 @@ from rosidl_adapter_proto.transcode.records import read_records
 
 PATH = "a.mcap"
 STRING = b"string data\n"
-QOS = "- history: 1\n"
+QOS = "- history: 10"
 RIHS = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 
 

@@ -18,7 +18,7 @@ from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.closure import type_closure
 from rosidl_adapter_proto.interfaces.model import TypeName
 
-QOS = "- history: 1\n  depth: 10\n"
+QOS = "- history: 1\n  depth: 10"
 SECOND = 10**9
 START = 1_700_000_000 * SECOND
 

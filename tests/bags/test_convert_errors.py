@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import zstandard
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType
@@ -178,6 +179,49 @@ def test_mixed_formats() -> None:
     assert convert(data, topics=["/a"]).counts["/a"] == Counts(converted=2)
 
 
+def test_files_of_different_formats() -> None:
+    Path("in").mkdir()
+    Path("in/0.mcap").write_bytes(mcap_bytes(strings("/a", 2)))
+    Path("in/1.mcap").write_bytes(mcap_bytes(strings("/a", 2), formats={"/a": "protobuf"}))
+    with pytest.raises(
+        BagError, match=r"^Topics with different rmw .* \(cdr: /a; protobuf: /a; `--topic` chooses"
+    ):
+        convert_bag("in", "out")
+    assert names() == ["in"]
+
+
+METADATA = """\
+rosbag2_bagfile_information:
+  version: 4
+  storage_identifier: mcap
+  duration: {nanoseconds: 0}
+  starting_time: {nanoseconds_since_epoch: 0}
+  message_count: 2
+  topics_with_message_count:
+    - topic_metadata:
+        {name: /a, type: std_msgs/msg/String, serialization_format: cdr, offered_qos_profiles: ""}
+      message_count: 2
+  compression_format: zstd
+  compression_mode: FILE
+  relative_file_paths: [0.mcap.zstd]
+"""
+
+
+def test_a_compressed_file_of_another_format() -> None:
+    """It is not opened before its turn: what metadata.yaml says is believed until then."""
+    Path("in").mkdir()
+    Path("in/metadata.yaml").write_text(METADATA)
+    data = mcap_bytes(strings("/a", 2), formats={"/a": "protobuf"})
+    Path("in/0.mcap.zstd").write_bytes(zstandard.compress(data))
+    with pytest.raises(BagError) as caught:
+        convert_bag("in", "out")
+    assert str(caught.value) == (
+        "Topics with different rmw serialization format have been found. All topics must have the same "
+        "serialization format. (in/0.mcap.zstd has protobuf, other files cdr)"
+    )
+    assert names() == ["in"]
+
+
 @pytest.mark.parametrize("label", ["cdr", "protobuf", "my_format"])
 def test_from_says_what_the_messages_are(label: str) -> None:
     data = mcap_bytes(strings("/a", 2), {"/b": STRING}, formats={"/a": label})
@@ -220,10 +264,10 @@ def test_labels_that_fit(header: bytes) -> None:
 # Damage
 
 
-def with_damage() -> bytes:
+def with_damage(where: int = 7) -> bytes:
     """Return a file one of whose chunks does not have the checksum that it should have."""
     data = bytearray(mcap_bytes(some_wrong({"/a": []}), TYPES, compression=CompressionType.NONE))
-    place = data.index(b"/a 7")
+    place = data.index(f"/a {where}".encode())
     data[place : place + 2] = b"??"
     return bytes(data)
 
@@ -237,9 +281,10 @@ def test_a_damaged_chunk() -> None:
     ), text
 
 
+@pytest.mark.parametrize("where", [0, 7])
 @pytest.mark.parametrize("on_error", ["skip", "copy"])
-def test_what_is_not_damaged_is_converted(on_error: str) -> None:
-    result = convert(with_damage(), on_error=on_error)
+def test_what_is_not_damaged_is_converted(on_error: str, where: int) -> None:
+    result = convert(with_damage(where), on_error=on_error)
     lost = result.total.lost
     assert 0 < lost < 10
     assert result.total == Counts(converted=23 - lost, lost=lost) and not result.is_complete

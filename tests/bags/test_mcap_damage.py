@@ -167,7 +167,7 @@ DAMAGES = {
     ),
     "garbage between records": Damage(
         insert(FILE, FOURTH.start, b"garbage" * 20),
-        "a.mcap at byte 4069: the summary is damaged: its checksum is 0x14efc15c and should be" " 0x8742a106",
+        "a.mcap at byte 4069: the summary is damaged: its checksum is 0x7d50d2de and should be" " 0xeefdb284",
         after=[
             f"a.mcap: {NOT_USED} 40 messages were found",
             "a.mcap at byte 1934: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of"
@@ -239,7 +239,7 @@ DAMAGES = {
     ),
     "a checksum of the summary": Damage(
         change(FILE, len(FILE) - 12, b"\1\2\3\4"),
-        "a.mcap at byte 4069: the summary is damaged: its checksum is 0x8742a106 and should be" " 0x04030201",
+        "a.mcap at byte 4069: the summary is damaged: its checksum is 0xeefdb284 and should be" " 0x04030201",
         after=[f"a.mcap: {NOT_USED} 40 messages were found"],
     ),
     "a count of messages": Damage(
@@ -267,9 +267,9 @@ DAMAGES = {
         count=38,
         after=[
             f"a.mcap: {NOT_USED} 38 messages were found",
-            "a.mcap at byte 33: the chunk is damaged: its checksum is 0x764366db and should be 0xfba4dd0e",
+            "a.mcap at byte 33: the chunk is damaged: its checksum is 0x3b63d351 and should be 0xb6846884",
             "a.mcap: 13 messages are of channel 2, which is not there",
-            "a.mcap at byte 33: the chunk is damaged: its checksum is 0x764366db and should be 0xfba4dd0e",
+            "a.mcap at byte 33: the chunk is damaged: its checksum is 0x3b63d351 and should be 0xb6846884",
         ],
     ),
     "two channels with one id": Damage(

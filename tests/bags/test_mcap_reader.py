@@ -162,6 +162,17 @@ def test_channels_that_rosbag2_does_not_count() -> None:
     assert reader.statistics == STATISTICS and not reader.warnings
 
 
+def test_qos_with_names_is_read_as_that_with_numbers() -> None:
+    """rosbag2 writes names since version 9 of the metadata."""
+
+    def named(writer: Writer) -> None:
+        qos = "- history: keep_last\n  depth: 5\n  reliability: best_effort\n"
+        writer.register_channel("/c", "cdr", 1, {"offered_qos_profiles": qos})
+
+    topics = reader_of(mcap_file(more=named)).topics
+    assert topics[3].qos_profiles == "- history: 1\n  depth: 5\n  reliability: 2"
+
+
 def test_several_channels_of_one_topic_are_topics_of_their_own() -> None:
     def again(writer: Writer) -> None:
         channel = writer.register_channel("/a", "cdr", 1, {"offered_qos_profiles": "- depth: 5\n"})

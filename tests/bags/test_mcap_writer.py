@@ -196,6 +196,17 @@ def test_one_schema_is_written_for_topics_of_one_type() -> None:
     assert [channel.schema_id for channel in summary.channels.values()] == [1, 1]
 
 
+def test_several_definitions_of_one_type_are_kept_for_the_way_back() -> None:
+    other = replace(
+        PROTOBUF,
+        name="/other",
+        definition=RecordedDefinition("protobuf", b"\x0a\x02\x0a\x00"),
+        ros_definition=RecordedDefinition("ros2msg", b"string data\nint32 more\n"),
+    )
+    topics = [PROTOBUF, other, replace(other, name="/third"), replace(PROTOBUF, name="/fourth")]
+    assert list(reader_of(write_topics(topics)).topics.values()) == topics
+
+
 def test_a_definition_with_letters_of_old_code_pages_is_kept_as_text() -> None:
     topic = replace(PROTOBUF, ros_definition=RecordedDefinition("ros2msg", b"# Gr\xf6\xdfe\nstring data\n"))
     (read,) = reader_of(write_topics([topic])).topics.values()

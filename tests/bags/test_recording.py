@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import re
 import tempfile
@@ -248,13 +249,13 @@ def test_compressed_messages_are_decompressed(tmp_path: Path, storage: str, kind
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
-        (b"no zstd", "cannot be decompressed: error when determining content size"),
+        (b"no zstd", "error when determining content size"),
         (
             b"\x28\xb5\x2f\xfd\xe0" + b"\xff" * 7 + b"\0" + bytes(4),
-            "cannot be decompressed: its size would be",
+            "its size would be",
         ),
-        (zstandard.ZstdCompressor().compress(b"text")[:-2], "cannot be decompressed: "),
-        (zstandard.ZstdCompressor().compress(b"text") + b"more", "cannot be decompressed: "),
+        (zstandard.ZstdCompressor().compress(b"text")[:-2], ""),
+        (zstandard.ZstdCompressor().compress(b"text") + b"more", ""),
     ],
 )
 def test_messages_that_cannot_be_decompressed_are_said(tmp_path: Path, data: bytes, expected: str) -> None:
@@ -262,11 +263,15 @@ def test_messages_that_cannot_be_decompressed_are_said(tmp_path: Path, data: byt
         tmp_path / "a.db3", rows=[Row("/a", 0, zstandard.ZstdCompressor().compress(b"")), Row("/a", 1, data)]
     )
     _describe(tmp_path, "a.db3", compression_mode="MESSAGE", compression_format="zstd")
+    reason = f"{path}, table messages, rows 1 to 2: a message of /a, recorded at 1, cannot be decompressed: "
     with pytest.raises(
-        BagError,
-        match=f"^{re.escape(f'{path}, table messages, rows 1 to 2: message 1 of the chunk: {expected}')}",
+        BagError, match=f"^{re.escape(reason + expected)}.*; `--on-error skip` leaves .* out$"
     ):
         _read(tmp_path)
+    with find_recording(str(tmp_path)).open(0, salvage=True) as reader:
+        assert not reader.is_damaged
+        assert rows_of(reader) == [Row("/a", 0, b"")]
+        assert reader.is_damaged and reader.warnings[0].startswith(reason + expected)
 
 
 def test_other_compressions_of_messages_are_refused(tmp_path: Path) -> None:
@@ -333,6 +338,37 @@ def test_damaged_compressed_files_are_said(tmp_path: Path) -> None:
         with pytest.raises(BagError) as caught:
             _read(path)
         assert str(caught.value).startswith(f"{path}: {expected}")
+
+
+def test_what_is_before_the_end_of_a_cut_off_file_is_salvaged(tmp_path: Path) -> None:
+    rows = [Row("/a", i, random.Random(i).randbytes(50_000)) for i in range(20)]
+    path = _compress(database(tmp_path / "a.db3", rows=rows))
+    content = path.read_bytes()[:-300_000]
+    path.write_bytes(content)
+    with find_recording(str(path)).open(0, salvage=True) as reader:
+        assert rows_of(reader) == rows[: len(rows_of(reader))]
+        assert len(rows_of(reader)) > 5 and reader.is_damaged
+        assert reader.warnings[0] == (
+            f"{path}: cut off: its compressed data does not end at its last byte, {len(content)}"
+        )
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    os.mkfifo(path)
+    with pytest.raises(BagError) as caught:
+        find_recording(str(path))
+    assert (
+        str(caught.value) == f"{path}: neither a file nor a folder, but a pipe or a device; copy it to a file"
+    )
+
+
+def test_a_description_in_a_file_of_a_version_that_is_not_known_is_left_out(tmp_path: Path) -> None:
+    path = database(tmp_path / "a.db3", more="INSERT INTO metadata VALUES (1, 10, 'version: 10')")
+    with find_recording(str(path)).open(0) as reader:
+        assert rows_of(reader) == list(ROWS)
+        (warning,) = reader.warnings
+    assert warning.startswith(f"{path}, the metadata in it: version: 10 is not known")
 
 
 def test_a_disk_without_room_for_a_decompressed_file_is_said(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bz2
+import re
 import struct
 from io import BytesIO
 from pathlib import Path
@@ -217,6 +218,7 @@ def _with_chunk(chunk: bytes) -> bytes:
     return header + chunk + b"".join(CONNECTIONS)
 
 
+SALVAGE = "; `--on-error skip` reads what is whole"
 WRONG = {
     "another version": (
         b"#ROSBAG V1.2\n" + BAG[13:],
@@ -229,7 +231,7 @@ WRONG = {
     ),
     "cut off": (
         BAG[:5000],
-        "cut off: its index should be at byte %d, but it has 5000 bytes",
+        "cut off: its index should be at byte %d, but it has 5000 bytes" + SALVAGE,
     ),
     "a record without a kind": (
         BAG[:13] + _u32(0) + _u32(0),
@@ -283,15 +285,15 @@ WRONG = {
     ),
     "counts of nobody": (
         BAG[: BAG.rindex(_connection(0, "/a"))] + _record(6, _u32(9) + _u32(1), **_INFO),
-        "at byte %d: damaged: messages of connection 9, which is not in the bag",
+        "at byte %d: damaged: messages of connection 9, which is not in the bag" + SALVAGE,
     ),
     "counts that are no counts": (
         BAG[: BAG.rindex(_connection(0, "/a"))] + _record(6, bytes(7), **_INFO),
-        "at byte %d: damaged: 7 bytes of counts, which have 8 bytes each",
+        "at byte %d: damaged: 7 bytes of counts, which have 8 bytes each" + SALVAGE,
     ),
     "a connection without a type": (
         BAG[: BAG.rindex(_connection(0, "/a"))] + _record(7, conn=_u32(0), topic=b"/a"),
-        "at byte %d: damaged: a connection without type",
+        "at byte %d: damaged: a connection without type" + SALVAGE,
     ),
     "a message of nobody": (
         BAG.replace(_message(0, ROWS[0]), _message(9, ROWS[0])),
@@ -300,7 +302,7 @@ WRONG = {
     ),
     "a topic that is no text": (
         BAG.replace(b"topic=/a", b"topic=/\xff"),
-        "at byte %d: topic is not UTF-8 at byte 1",
+        "at byte %d: topic is not UTF-8 at byte 1" + SALVAGE,
     ),
 }
 
@@ -325,6 +327,21 @@ def test_damaged_chunks_are_left_out_of_what_is_salvaged() -> None:
     assert rows == [*ROWS[:4], *ROWS[8:]]
     assert statistics == STATISTICS
     assert warnings == [f"{where}: damaged: byte 0 of a header is no field; what follows there is left out"]
+
+
+def test_a_bag_that_lost_its_end_is_salvaged_from_its_beginning() -> None:
+    content = BAG[: BAG.rindex(b"compression=none") + 50]
+    with Ros1Reader(BytesIO(content), "a.bag", salvage=True) as reader:
+        assert rows_of(reader) == list(ROWS[:8])
+        assert reader.statistics.message_count == 8 and reader.is_damaged
+        index, missing = reader.warnings
+    assert index == (
+        f"a.bag: cut off: its index should be at byte {INDEX}, but it has {len(content)} bytes; "
+        "read from its beginning, without the index"
+    )
+    assert re.fullmatch(
+        r"a\.bag at byte \d+: cut off: at least \d+ bytes of a record are missing; what follows .*", missing
+    )
 
 
 @given(

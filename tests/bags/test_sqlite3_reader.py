@@ -190,6 +190,13 @@ def test_what_a_killed_recorder_left_beside_its_database_is_honoured(
     assert _files(path.parent) == before
 
 
+def test_a_link_to_a_database_leads_to_what_lies_beside_it(tmp_path: Path) -> None:
+    path = tmp_path / "link.db3"
+    path.symlink_to(_killed(tmp_path, "wal"))
+    with SqliteReader(str(path)) as reader:
+        assert rows_of(reader) == list(ROWS)
+
+
 WRONG = {
     "data missing": (
         "UPDATE messages SET data = NULL WHERE id = 7",
@@ -242,6 +249,23 @@ def test_what_is_wrong_is_said_with_its_row(tmp_path: Path, name: str) -> None:
     with pytest.raises(BagError) as caught, SqliteReader(str(path)) as reader:
         rows_of(reader)
     assert str(caught.value) == f"{path}: {expected}"
+
+
+def test_rows_that_are_wrong_are_left_out_to_salvage_a_database(tmp_path: Path) -> None:
+    wrong = (
+        "UPDATE messages SET timestamp = -1 WHERE id IN (3, 5); UPDATE messages SET topic_id = 9 WHERE id = 7"
+    )
+    path = database(tmp_path / "a.db3", more=wrong)
+    with SqliteReader(str(path), salvage=True) as reader:
+        assert not reader.is_damaged
+        assert rows_of(reader) == [row for number, row in enumerate(ROWS, 1) if number not in (3, 5, 7)]
+        assert reader.statistics.message_count == len(ROWS) - 1
+        assert reader.is_damaged
+        assert reader.warnings == [
+            f"{path}: table messages, row 3: timestamp -1 is not a time in nanoseconds since 1970; it is left out, "
+            f"and 2 that are wrong up to row {len(ROWS)}",
+            f"{path}: table messages: topic_id 9 is not in the table topics; 1 rows are left out",
+        ]
 
 
 def test_messages_of_topics_that_are_not_listed_are_not_counted_silently(tmp_path: Path) -> None:
@@ -315,6 +339,26 @@ def test_a_damaged_database_is_salvaged(tmp_path: Path) -> None:
             for first in (lost[0], lost[7])
         ]
         assert reader.statistics.message_count == 1986
+
+
+def test_a_database_that_lost_its_end_is_salvaged(tmp_path: Path) -> None:
+    path = database(tmp_path / "a.db3", rows=LARGE_ROWS)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2 + 100])
+    with pytest.raises(BagError) as caught:
+        SqliteReader(str(path))
+    assert str(caught.value) == (
+        f"{path}: sqlite3 says: database disk image is malformed; `--on-error skip` reads what is whole"
+    )
+    with SqliteReader(str(path), salvage=True) as reader:
+        rows = rows_of(reader)
+        assert len(rows) > 500 and rows == list(LARGE_ROWS[: len(rows)]) and reader.is_damaged
+        assert reader.statistics.message_count == len(rows)
+        assert reader.warnings == [
+            f"{path}: cut off in the page of 4096 bytes that is its last; it is left out",
+            f"{path}: table messages, rows {len(rows) + 1} on are left out: "
+            "sqlite3 says: database disk image is malformed",
+        ]
 
 
 @pytest.fixture(scope="module")

@@ -140,6 +140,50 @@ def test_definitions_are_written_by_the_name_of_what_defines_them_as_they_are(tm
     connection.close()
 
 
+OTHER = {
+    "a definition without a hash": (
+        replace(STRING, type_hash=""),
+        replace(STRING, name="/b", type_hash="", definition=RecordedDefinition("ros2msg", b"int8 data\n")),
+    ),
+    "a descriptor": (
+        PROTOBUF_STRING,
+        replace(PROTOBUF_STRING, name="/q", definition=RecordedDefinition(PROTOBUF, b"\x0a\x02\x0a\x00")),
+    ),
+}
+
+
+@pytest.mark.parametrize("topics", OTHER.values(), ids=OTHER)
+def test_a_second_definition_of_a_type_has_no_room(tmp_path: Path, topics: tuple[Topic, Topic]) -> None:
+    path = tmp_path / "a.db3"
+    one, other = topics
+    with SqliteWriter(str(path)) as writer:
+        writer.add_topic(one)
+        with pytest.raises(BagError) as caught:
+            writer.add_topic(other)
+    assert str(caught.value) == (
+        f"{path}: {other.name} and {one.name} have other definitions of std_msgs/msg/String, and sqlite3 has room for "
+        "one; write MCAP instead"
+    )
+
+
+def test_a_definition_with_other_comments_is_the_same_by_its_hash(tmp_path: Path) -> None:
+    path = tmp_path / "a.db3"
+    other = replace(STRING, name="/b", definition=RecordedDefinition("ros2msg", b"# Text\nstring data\n"))
+    _write(path, {1: STRING, 2: other})
+    with SqliteReader(str(path)) as reader:
+        assert reader.topics[2] == replace(STRING, name="/b")
+
+
+def test_protobuf_topics_without_ros_types_keep_their_descriptors(tmp_path: Path) -> None:
+    path = tmp_path / "a.db3"
+    descriptors = {name: RecordedDefinition(PROTOBUF, name.encode()) for name in ("a.B", "a.C")}
+    topics = [Topic(f"/{name}", "", PROTOBUF, data, schema_name=name) for name, data in descriptors.items()]
+    _write(path, dict(enumerate(topics, 1)))
+    with SqliteReader(str(path)) as reader:
+        found = [(each.schema_name, each.definition) for each in reader.topics.values()]
+    assert found == list(descriptors.items())
+
+
 def test_names_of_qos_policies_are_written_as_numbers(tmp_path: Path) -> None:
     path = tmp_path / "a.db3"
     _write(

@@ -147,6 +147,19 @@ def test_unknown_topics_and_fields(run: Run) -> None:
     assert (ended.code, ended.out, ended.err) == (3, "", error)
 
 
+def test_a_wrong_message_ends_it(folder: Path, run: Run) -> None:
+    first, second, *_ = record([IMU], 1)
+    wrong = bag_maker.Recorded(second.log_time, IMU, 1, second.data[:4])
+    bag_maker.write_mcap(folder / "wrong.mcap", [first, wrong])
+
+    ended = run("bag", "cat", "wrong.mcap", "/imu")
+
+    assert (ended.code, len(ended.out.splitlines())) == (3, 1)
+    assert ended.err.startswith(
+        f"Error: wrong.mcap: message 2 of /imu, recorded at {second.log_time}: sensor_msgs/msg/Imu.header.stamp.sec"
+    )
+
+
 def test_what_json_has_no_words_for(folder: Path, run: Run) -> None:
     import numpy
 
