@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import re
 import subprocess
 import sys
 import threading
@@ -175,6 +176,31 @@ def test_nothing_is_left_if_files_cannot_be_moved(memory: Any, monkeypatch: pyte
     with pytest.raises(PlaceError, match=r"OSError: gone$"):
         convert_bag("in.mcap", "memory://out")
     assert moved == ["/out/in.mcap"] and names(memory) == []
+
+
+def test_no_bucket_is_made(memory: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    monkeypatch.setattr(type(memory), "makedirs", lambda self, path: made.append(path))
+    RemotePath("memory://folder/a").mkdir()
+    monkeypatch.setattr("fsspec.core.url_to_fs", lambda url: (memory, "bucket/folder/b"))
+    RemotePath("s3://bucket/folder/b").mkdir()
+    assert made == ["/folder/a"]
+
+
+def test_a_bucket_is_missing(memory: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(self: Any, data: bytes) -> int:
+        raise FileNotFoundError("The specified bucket does not exist")
+
+    monkeypatch.setattr("fsspec.implementations.memory.MemoryFile.write", missing, raising=False)
+    Path("in.mcap").write_bytes(mcap_bytes(MESSAGES))
+    with pytest.raises(BagError) as error:
+        convert_bag("in.mcap", "memory://bucket/out.mcap")
+    assert re.fullmatch(
+        r"memory://bucket/.out.mcap.partial-\w+/out.mcap: cannot be written: there is no such folder or bucket; "
+        "make it first",
+        str(error.value),
+    )
+    assert names(memory) == []
 
 
 def test_a_bag_does_not_go_into_itself(memory: Any) -> None:
