@@ -56,6 +56,7 @@ class McapReader:
         self.path = path
         self.is_damaged = False
         self._warnings: dict[str, None] = {}
+        self._unknown: dict[int, int] = {}  # where the first records of unknown kinds are
         self._file = McapFile(file, path)
         self._salvage = salvage
         self.profile = self._read_header().profile
@@ -187,8 +188,8 @@ class McapReader:
     def _check(self, place: Place) -> None:
         """Compare a record with what is known of the file."""
         where = self._file.where(place.start)
-        if place.opcode not in KNOWN_OPCODES:
-            self._warn(f"{where}: {place.name} is left out")
+        if place.opcode not in KNOWN_OPCODES and self._unknown.setdefault(place.opcode, place.start) == place.start:
+            self._warn(f"{where}: {place.name} is left out, and so are all others of it")
         if place.opcode not in DEFINITIONS:
             return
         channels = self._contents.channels
