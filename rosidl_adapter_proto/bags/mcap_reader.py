@@ -187,7 +187,10 @@ class McapReader:
     def _check(self, place: Place) -> None:
         """Compare a record with what is known of the file."""
         where = self._file.where(place.start)
-        if place.opcode not in KNOWN_OPCODES and self._unknown.setdefault(place.opcode, place.start) == place.start:
+        if (
+            place.opcode not in KNOWN_OPCODES
+            and self._unknown.setdefault(place.opcode, place.start) == place.start
+        ):
             self._warn(f"{where}: {place.name} is left out, and so are all others of it")
         if place.opcode not in DEFINITIONS:
             return
