@@ -231,8 +231,16 @@ class Bag:
                 continue
             self._check_open()
             with self.recording.open(index) as reader:
+                found = 0
                 for run in self._file_runs(reader, Selection(ids, start_time, end_time), threads):
+                    found += len(run.indexes)
                     yield reader, run
+            said = sum(file.statistics.message_counts.get(each, 0) for each in ids)
+            if found != said and not start_time and end_time is None:
+                raise BagError(
+                    f"{file.path}: it says that there are {said} messages of these topics, but {found} were found; "
+                    "`bag convert --on-error skip` makes a bag of those"
+                )
 
     def _file_runs(self, reader: StorageReader, selection: Selection, threads: int) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:

@@ -211,6 +211,7 @@ class _FileConversion:
                 self._failed_ids,
                 Converter(task.source_format, task.target_format, settings.registry),
             ),
+            topic_ids=self._routes,
             writer=self._writer,
             start_time=settings.start_time,
             end_time=settings.end_time,
