@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, BinaryIO
 
+from isal.isal_zlib import crc32
 from mcap import records
 from mcap.opcode import Opcode
 
@@ -122,7 +122,7 @@ class McapWriter:
         return PackedMcapChunk(
             compress(records, self.compression),
             memoryview(records).nbytes,
-            zlib.crc32(records),
+            crc32(records),
             index_records(records),
         )
 
@@ -218,7 +218,7 @@ class McapWriter:
         footer = write(records.Footer(summary_start, offset_start, 0))[:-4]
         summary += offsets + footer
         self._write(summary)
-        self._write(zlib.crc32(summary).to_bytes(4, "little"))
+        self._write(crc32(summary).to_bytes(4, "little"))
         self._write(MAGIC)
         self._file.close()
 
