@@ -334,7 +334,7 @@ def open_bag(
     """Open a bag for reading.
 
     Args:
-        path: A folder of rosbag2, an `.mcap` or `.db3` file, or a ROS 1 `.bag`.
+        path: A folder of rosbag2, an `.mcap` or `.db3` file, or a ROS 1 `.bag`: a path, or a URL that fsspec knows.
         include: Folders of packages that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else; by default
             `$ROS_DISTRO`, else the newest.
@@ -344,6 +344,8 @@ def open_bag(
 
     Raises:
         BagError: There is no bag, or it cannot be read.
+        PlaceError: The place that a URL names cannot be reached.
+        RequestError: There is nothing installed that knows the URL.
     """
     bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in include], distro)
     bag.files  # noqa: B018  # what is wrong with a file is said here
