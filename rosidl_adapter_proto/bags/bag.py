@@ -297,6 +297,7 @@ class Bag:
         for reader in self.recording.readers():
             files.append(BagFile(reader.path, reader.storage, reader.topics, reader.statistics))
             warnings.extend(reader.warnings)
+        warnings += self.recording.count_warnings(sum(file.statistics.message_count for file in files))
         types: dict[str, set[str]] = {}
         for topic in (topic for file in files for topic in file.topics.values()):
             types.setdefault(topic.name, set()).add(topic.type_name)

@@ -132,6 +132,8 @@ class ConversionResult:
         failed_count: How many messages cannot be converted; `failures` has the first of them.
         source_size: The size of the source in bytes.
         size: The size of the result in bytes.
+        is_damaged: Whether something of the source could not be read, as `warnings` say. What that would have been
+            need not be known: then no count has it.
     """
 
     counts: Mapping[str, Counts] = field(default_factory=dict)
@@ -140,6 +142,7 @@ class ConversionResult:
     warnings: Sequence[str] = ()
     source_size: int = 0
     size: int = 0
+    is_damaged: bool = False
 
     @property
     def total(self) -> Counts:
@@ -149,7 +152,7 @@ class ConversionResult:
     @property
     def is_complete(self) -> bool:
         """Whether every message that was selected was read, and has the serialization format that was asked for."""
-        return not (self.failed_count or self.total.skipped or self.total.lost)
+        return not (self.failed_count or self.total.skipped or self.total.lost or self.is_damaged)
 
     def __add__(self, other: ConversionResult) -> ConversionResult:
         names = {**self.counts, **other.counts}
@@ -161,6 +164,7 @@ class ConversionResult:
             tuple(dict.fromkeys((*self.warnings, *other.warnings))),
             self.source_size + other.source_size,
             self.size + other.size,
+            self.is_damaged or other.is_damaged,
         )
 
 

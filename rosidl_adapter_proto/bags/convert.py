@@ -20,7 +20,7 @@ from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFI
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.routes import formats, selected_topics
 from rosidl_adapter_proto.bags.workers import Workers
-from rosidl_adapter_proto.converters import ConverterRegistry
+from rosidl_adapter_proto.converters import Converter, ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog
@@ -152,6 +152,7 @@ def convert_with(
     _check_names([*settings.topics, *settings.excluded_topics], topics)
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
+    Converter(source_format, target_format, settings.registry)  # that there is none is said before all else
     size = sum(file_size(find_place(file.path)) for file in recording.files)
     result = ConversionResult(warnings=recording.warnings, source_size=size)
     written: list[WrittenFile] = []
@@ -165,6 +166,7 @@ def convert_with(
         for name, task, each in zip(names, tasks, made, strict=True):
             written.append(WrittenFile(name, each.topics, each.statistics))
             result += replace(each.result, size=file_size(task.destination))
+        result += ConversionResult(warnings=recording.count_warnings(result.total.total))
         if is_folder:
             text = write_metadata(describe(storage, written, recording.metadata))
             (place / METADATA_FILE).write_bytes(text.encode())

@@ -171,7 +171,11 @@ class _FileConversion:
         self._writer.finish()
         warnings = [*self._reader.warnings, *self._types.warnings, *self._warnings, *self._ledger.warnings]
         result = ConversionResult(
-            counts, self._ledger.failures, self._ledger.failed_count, tuple(dict.fromkeys(warnings))
+            counts,
+            self._ledger.failures,
+            self._ledger.failed_count,
+            tuple(dict.fromkeys(warnings)),
+            is_damaged=self._reader.is_damaged or self._ledger.is_damaged,
         )
         return FileResult(result, self._topics, statistics)
 

@@ -17,6 +17,7 @@ class Ledger:
     Attributes:
         failures: The first messages that could not be converted.
         warnings: What the user should know.
+        is_damaged: Whether something of the file could not be read.
 
     Args:
         path: The file, for people.
@@ -30,6 +31,7 @@ class Ledger:
     ) -> None:
         self.failures: list[FailedMessage] = []
         self.warnings: list[str] = []
+        self.is_damaged = False
         self._path = path
         self._routes = routes
         self._said = said
@@ -84,6 +86,7 @@ class Ledger:
         """
         if self._on_error is OnError.STOP:
             raise BagError(f"{damage}{advice}")
+        self.is_damaged = True
         self.warnings.append(str(damage))
 
     def counts(self, written: Mapping[int, int]) -> dict[str, Counts]:

@@ -12,6 +12,7 @@ from google.protobuf import json_format
 from google.protobuf.descriptor import Descriptor
 
 from rosidl_adapter_proto.bags.message import BagMessage
+from rosidl_adapter_proto.errors import BagError
 
 # Fields that are 0 or empty are printed too; protobuf 26 has another name for that.
 _ARGUMENTS = ("always_print_fields_with_no_presence", "including_default_value_fields")
@@ -51,7 +52,15 @@ def message_json(recorded: BagMessage, chosen: Chosen = ALL) -> str:
     Raises:
         BagError: The message is not valid.
     """
-    message = json_format.MessageToDict(recorded.message, preserving_proto_field_name=True, **_PRINT_ALL)
+    try:
+        message = json_format.MessageToDict(recorded.message, preserving_proto_field_name=True, **_PRINT_ALL)
+    except (
+        json_format.Error,
+        TypeError,
+        ValueError,
+    ) as error:  # such as an Any of a type that is not in the bag
+        where = f"a message of {recorded.topic}, recorded at {recorded.log_time}"
+        raise BagError(f"{where}: protobuf cannot write it as JSON: {error}") from None
     line = {
         "topic": recorded.topic,
         "log_time": recorded.log_time,

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 _URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")
 _BLOCK_SIZE = 2**23  # bytes that are fetched at once; the next ones are fetched while these are used
+_NO_FOLDER = "cannot be written: there is no such folder or bucket; make it first"
 _BLOCKS = 8  # of them are kept in memory for each open file
 
 
@@ -76,9 +77,12 @@ class RemotePath:
         """Tell whether it is a folder. A page of a web server is a file."""
         return not self.is_file() and bool(self._ask("isdir"))
 
-    def mkdir(self, *, exist_ok: bool = False) -> None:
-        """Make the folder; on object stores there is nothing to make."""
-        self._ask("makedirs", exist_ok=exist_ok)
+    def mkdir(self) -> None:
+        """Make the folder, unless it is in a bucket, as object stores have them: there is nothing to make there."""
+        with _told(self):
+            file_system, path = self._file_system()
+            if path.startswith("/"):  # else the first part is a bucket, which must not be made by mistake
+                file_system.makedirs(path)
 
     def iterdir(self) -> Iterator[RemotePath]:
         """Yield what is in the folder."""
@@ -115,7 +119,7 @@ class RemotePath:
 
     def upload(self, source: Path) -> None:
         """Copy a file of this machine there."""
-        with _told(self):
+        with _told(self, _NO_FOLDER):
             file_system, path = self._file_system()
             file_system.put_file(str(source), path)
 
@@ -181,7 +185,7 @@ class _RemoteFile(io.BufferedIOBase):
             return bytes(self._file.read(-1 if size is None else size))
 
     def write(self, data: Buffer) -> int:
-        with _told(self._place):
+        with _told(self._place, _NO_FOLDER):
             return int(self._file.write(data))
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
@@ -194,19 +198,19 @@ class _RemoteFile(io.BufferedIOBase):
     def close(self) -> None:
         if not self.closed:
             super().close()
-            with _told(self._place):
+            with _told(self._place, _NO_FOLDER):
                 self._file.close()
 
 
 @contextlib.contextmanager
-def _told(place: RemotePath) -> Iterator[None]:
-    """Raise our errors for those of file systems, of which each has its own."""
+def _told(place: RemotePath, missing: str = "no such file or folder") -> Iterator[None]:
+    """Raise our errors for those of file systems, of which each has its own; `missing` tells what is not found."""
     try:
         yield
     except (BagError, PlaceError, RequestError):
         raise
     except FileNotFoundError:
-        raise BagError(f"{place}: no such file or folder") from None
+        raise BagError(f"{place}: {missing}") from None
     except PermissionError as error:
         raise BagError(f"{place}: {error or 'no permission'}") from error
     except Exception as error:

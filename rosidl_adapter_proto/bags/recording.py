@@ -45,6 +45,19 @@ class Recording:
         """The storage of its first file, by its name in rosbag2."""
         return self.files[0].storage
 
+    def count_warnings(self, message_count: int) -> list[str]:
+        """Return what to say if its files have less messages together than metadata.yaml says."""
+        metadata = self.metadata
+        if (
+            metadata is None
+            or len(metadata.paths) != len(self.files)
+            or metadata.message_count <= message_count
+        ):
+            return []
+        return [
+            f"{self.path}: {METADATA_FILE} says {metadata.message_count} messages, but its files have {message_count}"
+        ]
+
     def open(self, index: int, salvage: bool = False) -> StorageReader:
         """Open a file.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rosidl_adapter_proto.bags.descriptors import descriptor_set, recorded_class
-from rosidl_adapter_proto.bags.model import PROTOBUF, RecordedDefinition, Topic
+from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, RecordedDefinition, Topic
 from rosidl_adapter_proto.errors import BagError, DefinitionError, MissingDefinitionError, SchemaError
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog, interface_base
@@ -32,6 +32,7 @@ from rosidl_adapter_proto.interfaces.recorded import (
 )
 from rosidl_adapter_proto.schema.pools import MessageClass
 from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
+from rosidl_adapter_proto.transcode.codec import Transcoder
 
 _PROTO_NAME = re.compile(r"(\w+)\.(msg|srv|action)\.pb\.(\w+)")
 _KNOWN_HASH = "RIHS01_"
@@ -132,7 +133,7 @@ class BagTypes:
         known: dict[TypeName, tuple[Definition, str]] = {}
         types: dict[TypeName, None] = {}
         for topic in self._topics:
-            if topic.serialization_format == PROTOBUF and not _is_ros_type(topic):
+            if not _is_ros_type(topic):
                 continue
             schema = self.schema(topic)
             types[interface_base(TypeName.parse(schema.type_name))] = None
@@ -150,7 +151,7 @@ class BagTypes:
             own = self._definitions(topic)
             schema = self._registry(name, own)[name]
             self._check_version(topic, schema, own)
-            return _with_recorded_class(schema, topic) if topic.serialization_format == PROTOBUF else schema
+            return self._with_recorded_class(schema, topic)
         except MissingDefinitionError as error:
             raise _problem(topic, f"{error}; {_ADVICE}") from None
         except (BagError, DefinitionError, SchemaError) as error:
@@ -171,6 +172,25 @@ class BagTypes:
             if foreign:
                 raise BagError(f"it {difference} with {origins}: {_ADVICE}")
             self._warn(f"{schema.type_name} {difference} with the definition in the recording, which is used")
+
+    def _with_recorded_class(self, schema: Schema, topic: Topic) -> Schema:
+        """Return a schema whose class is that of the recording: the same one, if descriptors are the same."""
+        if topic.serialization_format != PROTOBUF or protobuf_definition(schema) == topic.definition:
+            return schema
+        if topic.definition.encoding != PROTOBUF:
+            self._warn(
+                f"{schema.type_name}: the recording has no protobuf descriptor; the one that `generate` makes is used"
+            )
+            return schema
+        recorded = replace(schema, _message_class=_recorded_class(topic))
+        try:
+            Transcoder(recorded.type_description, recorded.descriptor)
+        except SchemaError as error:
+            what = str(error).partition(";")[0]
+            raise BagError(
+                f"its protobuf descriptor does not fit its ROS definition: {what}; --include FOLDER gives another one"
+            ) from None
+        return recorded
 
     def _warn(self, text: str) -> None:
         if text not in self.warnings:
@@ -239,8 +259,9 @@ def _key(topic: Topic) -> Hashable:
 
 
 def _recorded(topic: Topic) -> RecordedDefinition:
-    """Return the ROS definition that the recording has for a topic."""
-    return topic.ros_definition if topic.serialization_format == PROTOBUF else topic.definition
+    """Return the ROS definition that the recording has for a topic, wherever: its format may be what the user says."""
+    both = (topic.definition, topic.ros_definition)
+    return next((each for each in both if each.encoding in ENCODINGS), RecordedDefinition())
 
 
 def _recorded_definitions(topic: Topic, name: TypeName) -> Package:
@@ -277,7 +298,9 @@ def _ros_type(topic: Topic) -> TypeName:
 
 
 def _is_ros_type(topic: Topic) -> bool:
-    return "/" in topic.type_name or _PROTO_NAME.fullmatch(topic.schema_name) is not None
+    """Tell whether a topic has a ROS type, as all of those have that ROS itself has serialized."""
+    is_ros = "/" in topic.type_name or topic.serialization_format in (CDR, ROS1)
+    return is_ros or _PROTO_NAME.fullmatch(topic.schema_name) is not None
 
 
 def _recorded_class(topic: Topic) -> MessageClass:
@@ -289,10 +312,3 @@ def _recorded_class(topic: Topic) -> MessageClass:
     if topic.definition.encoding != PROTOBUF or not topic.definition.data:
         raise BagError(f"the recording has no protobuf descriptor of {topic.schema_name or topic.type_name}")
     return recorded_class(topic.definition.data, topic.schema_name)
-
-
-def _with_recorded_class(schema: Schema, topic: Topic) -> Schema:
-    """Return a schema whose class is that of the recording: the same one, if descriptors are the same."""
-    if protobuf_definition(schema) == topic.definition:
-        return schema
-    return replace(schema, _message_class=_recorded_class(topic))

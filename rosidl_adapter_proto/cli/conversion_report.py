@@ -92,7 +92,8 @@ def _show_failures(result: ConversionResult) -> None:
         click.echo(f"Cannot convert {failure}", err=True)
     more = result.failed_count - len(result.failures)
     if more > 0:
-        click.echo(f"Cannot convert {more} more messages", err=True)
+        count = f"{more} more" if result.failures else more
+        click.echo(f"Cannot convert {count} message{'' if more == 1 else 's'}", err=True)
 
 
 def _summary(result: ConversionResult, destination: str, seconds: float | None) -> str:

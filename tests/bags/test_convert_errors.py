@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType
 
+from rosidl_adapter_proto.bags.bag import open_bag
 from rosidl_adapter_proto.bags.conversion import ConversionResult, Counts
 from rosidl_adapter_proto.bags.convert import convert_bag
 from rosidl_adapter_proto.errors import BagError, ConverterError, Error, RequestError
@@ -222,6 +223,15 @@ def test_a_compressed_file_of_another_format() -> None:
     assert names() == ["in"]
 
 
+def test_fewer_messages_than_metadata_says() -> None:
+    Path("in").mkdir()
+    Path("in/metadata.yaml").write_text(METADATA.replace("message_count: 2", "message_count: 3"))
+    Path("in/0.mcap").write_bytes(mcap_bytes(strings("/a", 2)))
+    warning = "in: metadata.yaml says 3 messages, but its files have 2"
+    assert warning in convert_bag("in", "out").warnings
+    assert warning in open_bag("in").warnings
+
+
 @pytest.mark.parametrize("label", ["cdr", "protobuf", "my_format"])
 def test_from_says_what_the_messages_are(label: str) -> None:
     data = mcap_bytes(strings("/a", 2), {"/b": STRING}, formats={"/a": label})
@@ -301,6 +311,13 @@ def test_a_truncated_file() -> None:
     found = contents(Path("out.mcap")).messages
     assert 10 < result.total.converted == len(found) < 30
     assert [each.log_time for each in found] == [each.log_time for each in strings("/a", 40)[: len(found)]]
+    assert result.is_damaged and not result.is_complete  # how much is lost nobody knows
+
+
+def test_damage_among_chosen_times() -> None:
+    """Whether the lost messages were of these times nobody knows."""
+    result = convert(with_damage(), on_error="skip", end=START + 100 * 10**9)
+    assert result.total.lost == 0 and result.is_damaged and not result.is_complete
 
 
 def test_what_sqlite3_has_no_room_for() -> None:
@@ -327,6 +344,8 @@ def test_no_converter() -> None:
         convert(data, target_format="ros1")
     with pytest.raises(ConverterError, match=r"^Could not find converter for format my_format"):
         convert(data, source_format="my_format")
+    with pytest.raises(ConverterError, match=r"^Could not find converter for format json"):
+        convert(mcap_bytes(strings("/a", 2), {"/a": "no ROS type"}, formats={"/a": "json"}))
     assert names() == ["in.mcap"]
 
 

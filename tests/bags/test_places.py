@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import re
 import subprocess
 import sys
 import threading
@@ -177,6 +178,31 @@ def test_nothing_is_left_if_files_cannot_be_moved(memory: Any, monkeypatch: pyte
     assert moved == ["/out/in.mcap"] and names(memory) == []
 
 
+def test_no_bucket_is_made(memory: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    monkeypatch.setattr(type(memory), "makedirs", lambda self, path: made.append(path))
+    RemotePath("memory://folder/a").mkdir()
+    monkeypatch.setattr("fsspec.core.url_to_fs", lambda url: (memory, "bucket/folder/b"))
+    RemotePath("s3://bucket/folder/b").mkdir()
+    assert made == ["/folder/a"]
+
+
+def test_a_bucket_is_missing(memory: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(self: Any, data: bytes) -> int:
+        raise FileNotFoundError("The specified bucket does not exist")
+
+    monkeypatch.setattr("fsspec.implementations.memory.MemoryFile.write", missing, raising=False)
+    Path("in.mcap").write_bytes(mcap_bytes(MESSAGES))
+    with pytest.raises(BagError) as error:
+        convert_bag("in.mcap", "memory://bucket/out.mcap")
+    assert re.fullmatch(
+        r"memory://bucket/.out.mcap.partial-\w+/out.mcap: cannot be written: there is no such folder or bucket; "
+        "make it first",
+        str(error.value),
+    )
+    assert names(memory) == []
+
+
 def test_a_bag_does_not_go_into_itself(memory: Any) -> None:
     memory.pipe("/in/a.mcap", mcap_bytes(MESSAGES))
     with pytest.raises(
@@ -287,7 +313,6 @@ class Server(BaseHTTPRequestHandler):
 @pytest.fixture
 def server() -> Iterator[str]:
     """Yield the URL of a web server for the current folder."""
-    pytest.importorskip("aiohttp")
     with ThreadingHTTPServer(("127.0.0.1", 0), Server) as running:
         thread = threading.Thread(target=running.serve_forever)
         thread.start()

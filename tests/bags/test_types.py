@@ -429,9 +429,26 @@ def test_a_descriptor_that_does_not_fit_the_ros_type() -> None:
     recorded = Topic(
         **{**vars(cloud(VECTOR, name="foxglove.Vector")), "type_name": "geometry_msgs/msg/Vector3"}
     )
-    schema = types(recorded, distro="jazzy").schema(recorded)
-    with pytest.raises(SchemaError, match=r"Vector3\.y: foxglove\.Vector does not have this field"):
-        Transcoder(schema.type_description, schema.descriptor)
+    assert refused(recorded, distro="jazzy") == (
+        "topic /cloud (geometry_msgs/msg/Vector3): its protobuf descriptor does not fit its ROS definition: "
+        "geometry_msgs/msg/Vector3.y: foxglove.Vector does not have this field; --include FOLDER gives another one"
+    )
+
+
+def test_messages_that_only_the_user_calls_protobuf_have_the_numbers_of_generated_code() -> None:
+    labelled = topic(TRACK + HEADER)
+    said = topic(TRACK + HEADER, serialization_format=PROTOBUF)
+    bag = types(said)
+    assert bag.schema(said).descriptor is types(labelled).schema(labelled).descriptor
+    assert bag.ros_definition(said) == labelled.definition
+    assert bag.warnings == [
+        "my_msgs/msg/Track: the recording has no protobuf descriptor; the one that `generate` makes is used"
+    ]
+
+
+def test_topics_that_are_not_of_ros_are_not_generated() -> None:
+    recorded = topic(TRACK + HEADER), Topic("/json", "", "json"), cloud(VECTOR, CLOUD)
+    assert types(*recorded).recorded_types().types == (TypeName("my_msgs", "msg", "Track"),)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from google.protobuf import any_pb2
+from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
+from mcap.writer import Writer
 
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, SMALL_IMAGE, START, TF, record
@@ -186,3 +189,22 @@ def test_a_pipe_that_closes(bag: Path) -> None:
 
     assert (ended.returncode, ended.stderr) == (1, "")
     assert json.loads(ended.stdout)["topic"] == "/imu"
+
+
+def test_a_message_that_is_no_json(bag: Path, run: Run) -> None:
+    """An Any may have a type that is nowhere."""
+    files = FileDescriptorSet(file=[FileDescriptorProto.FromString(any_pb2.DESCRIPTOR.serialized_pb)])
+    with bag.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("google.protobuf.Any", "protobuf", files.SerializeToString())
+        channel = writer.register_channel("/any", "protobuf", schema)
+        writer.add_message(channel, 5, any_pb2.Any(type_url="a/b.C").SerializeToString(), 5)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+    ended = run("bag", "cat", "bag.mcap", "/any")
+
+    assert ended.code == 3
+    assert ended.err.startswith(
+        "Error: a message of /any, recorded at 5: protobuf cannot write it as JSON: Can not find message descriptor"
+    )

@@ -133,7 +133,7 @@ def test_an_empty_bag(folder: Path, run: Run) -> None:
     ]
 
 
-def test_a_damaged_bag(bag: Path, run: Run) -> None:
+def test_what_is_in_chunks_is_not_looked_for(bag: Path, run: Run) -> None:
     data = bytearray(bag.read_bytes())
     data[5000:5004] = bytes(4)
     bag.write_bytes(data)
@@ -142,8 +142,8 @@ def test_a_damaged_bag(bag: Path, run: Run) -> None:
 
     assert ended.code == 0
     assert "messages:  500\n" in ended.out
-    assert ended.err.startswith("Warning: bag.mcap at byte ")
-    assert ": the chunk is damaged: " in ended.err
+    assert ended.err == ""
+    assert ": the chunk is damaged: " in run("bag", "cat", "bag.mcap", "/imu").err
 
 
 def test_no_bag(run: Run) -> None:
