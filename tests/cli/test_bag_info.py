@@ -9,7 +9,8 @@ import pytest
 
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, JOINT_STATES, TF, record
-from rosidl_adapter_proto.cli.commands.bag.info import _size
+from rosidl_adapter_proto.cli.commands.bag.info import _rate
+from rosidl_adapter_proto.cli.conversion_report import size_text
 from tests.cli.conftest import Run
 
 
@@ -28,7 +29,7 @@ def test_info(bag: Path, run: Run) -> None:
     assert ended.out == f"""\
 files:     bag.mcap
 storage:   mcap, zstd
-size:      {_size(bag.stat().st_size)}
+size:      {size_text(bag.stat().st_size)}
 messages:  500
 duration:  1.995000000 s
 start:     2023-11-14T22:13:20.000000000Z (1700000000000000000)
@@ -153,15 +154,35 @@ def test_no_bag(run: Run) -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "printed"),
+    ("count", "seconds", "printed"),
     [
-        (0, "0 B"),
-        (999, "999 B"),
-        (1000, "1 kB"),
-        (12_345_678, "12.3 MB"),
-        (10**14, "100 TB"),
-        (10**18, "1e+03 PB"),
+        (0, 1, ""),
+        (1, 0, ""),
+        (5, 3, "1.67 Hz"),
+        (999, 1, "999 Hz"),
+        (9996, 10, "1000 Hz"),
+        (123456, 1, "123456 Hz"),
     ],
 )
-def test_sizes(size: int, printed: str) -> None:
-    assert _size(size) == printed
+def test_rates(count: int, seconds: int, printed: str) -> None:
+    assert _rate(count, seconds * 10**9) == printed
+
+
+def test_protobuf_messages_of_other_programs(folder: Path, run: Run) -> None:
+    from google.protobuf import timestamp_pb2
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+    from mcap.writer import Writer
+
+    files = FileDescriptorSet()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    with Path("bag.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("google.protobuf.Timestamp", "protobuf", files.SerializeToString())
+        writer.add_message(writer.register_channel("/a", "protobuf", schema), 5, b"", 5)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+    ended = run("bag", "info", "bag.mcap")
+
+    assert ended.out.endswith("/a     google.protobuf.Timestamp  protobuf         1        nowhere\n")
+    assert ended.err.startswith("Warning: topic /a (google.protobuf.Timestamp): its messages are protobuf")

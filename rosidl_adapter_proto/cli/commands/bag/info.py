@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rosidl_adapter_proto.cli.conversion_report import size_text
 from rosidl_adapter_proto.cli.options import bag_source_options
 from rosidl_adapter_proto.time import to_datetime
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.information import BagInformation
 
-_UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
 
-
-@click.command("info")
+@click.command("info", short_help="Tell what is in a bag.")
 @click.argument("bag", type=click.Path())
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for other programs.")
 @bag_source_options
@@ -40,7 +39,7 @@ def _print(information: BagInformation) -> None:
     rows = [
         *(("" if index else "files:", file) for index, file in enumerate(information.files)),
         ("storage:", ", ".join([*information.storage, *information.compression])),
-        ("size:", _size(information.size)),
+        ("size:", size_text(information.size)),
         ("messages:", str(information.message_count)),
     ]
     if information.message_count:
@@ -58,7 +57,7 @@ def _print(information: BagInformation) -> None:
             each.type_name,
             each.serialization_format,
             str(each.message_count),
-            f"{each.message_count / duration * 1e9:.3g} Hz" if duration and each.message_count else "",
+            _rate(each.message_count, duration),
             each.types_from,
         )
         for each in information.topics
@@ -72,11 +71,11 @@ def _print(information: BagInformation) -> None:
         click.echo(f"Warning: {warning}", err=True)
 
 
-def _size(size: float) -> str:
-    unit = 0
-    while size >= 1000 and unit < len(_UNITS) - 1:
-        size, unit = size / 1000, unit + 1
-    return f"{size:.3g} {_UNITS[unit]}"
+def _rate(count: int, duration: int) -> str:
+    rate = count / duration * 1e9 if duration else 0.0
+    if not rate:
+        return ""
+    return f"{rate:.3g} Hz" if rate < 999.5 else f"{rate:.0f} Hz"
 
 
 def _date(nanoseconds: int) -> str:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
 from rosidl_adapter_proto.errors import RequestError
 
 
-@click.command("table")
+@click.command("table", short_help="Write a topic as Parquet, Arrow or CSV.")
 @click.argument("bag", type=click.Path())
-@click.argument("topic")
+@click.argument("topic", shell_complete=complete_topic)
 @click.option("--output", "-o", required=True, type=click.Path(), metavar="FILE", help="The table.")
 @click.option(
     "--format",
@@ -23,7 +23,7 @@ from rosidl_adapter_proto.errors import RequestError
     type=click.Choice(["parquet", "arrow", "csv"]),
     help="What to write, where the suffix of FILE does not say.",
 )
-@click.option("--fields", metavar="A.B,C", help="Only these fields of the messages.")
+@fields_option("Only these fields of the messages.")
 @time_options
 @bag_source_options
 def command(
@@ -31,7 +31,7 @@ def command(
     topic: str,
     output: str,
     file_format: str | None,
-    fields: str | None,
+    fields: list[str] | None,
     start: int | None,
     end: int | None,
     include: tuple[Path, ...],
@@ -48,7 +48,8 @@ def command(
         from rosidl_adapter_proto.bags.table import write_table
     except ImportError as error:
         raise RequestError(str(error)) from None
-    names = None if fields is None else [name.strip() for name in fields.split(",")]
+    if output == "-":
+        raise RequestError("a table cannot go to the standard output; name a file")
     with open_bag(bag, include=include, distro=distro) as opened:
         found = opened.topics.get(topic)
         with _progress_bar(found.message_count if found else 0) as progress:
@@ -57,7 +58,7 @@ def command(
                 topic,
                 output,
                 file_format=file_format,
-                fields=names,
+                fields=fields,
                 start=start,
                 end=end,
                 progress=progress,
