@@ -81,7 +81,8 @@ def show_outcomes(outcomes: Sequence[BagOutcome], seconds: float) -> None:
     }
     size = sum(result.source_size for result in results)
     texts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    click.echo(f"{len(outcomes)} bags: {texts}; in {time_text(seconds)} ({size_text(size / seconds)}/s)")
+    bags = "1 bag" if len(outcomes) == 1 else f"{len(outcomes)} bags"
+    click.echo(f"{bags}: {texts}; in {time_text(seconds)} ({size_text(size / seconds)}/s)")
     for outcome in failed:
         where = "" if outcome.source in outcome.error else f"{outcome.source}: "
         click.echo(f"Failed: {where}{outcome.error}", err=True)
