@@ -7,6 +7,7 @@ type of a channel, and ROS's definition of it, are kept beside the descriptors, 
 from __future__ import annotations
 
 import re
+from base64 import b64decode, b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -15,6 +16,7 @@ from mcap.records import Channel, Metadata, Schema
 from rosidl_adapter_proto.bags.metadata import read_metadata
 from rosidl_adapter_proto.bags.model import CDR, ROS1, RecordedDefinition, Topic
 from rosidl_adapter_proto.bags.qos import numbered_qos
+from rosidl_adapter_proto.errors import BagError
 
 QOS_PROFILES = "offered_qos_profiles"
 TYPE_HASH = "topic_type_hash"
@@ -24,8 +26,10 @@ ROS_DEFINITIONS = "rosidl_adapter_proto.ros_definitions"
 """The metadata record with ROS's definitions: by the name of the type, its encoding, a newline, and the text.
 
 Where a file has several definitions of a type, as merged recordings may, the others have the id of the schema behind
-the name of the type: `pkg/msg/Type 2`.
+the name of the type: `pkg/msg/Type 2`. Behind the encoding ` base64` says how a text is written that is not UTF-8.
 """
+
+_BASE64 = " base64"
 
 _PROTOBUF_NAME = re.compile(r"(?P<package>\w+)\.(?P<kind>msg|srv|action)\.pb\.(?P<name>\w+)", re.ASCII)
 _ROS_NAME = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
@@ -43,7 +47,7 @@ def read_topics(
         path: The file, for people.
 
     Raises:
-        BagError: The description of rosbag2 is needed and damaged.
+        BagError: The description of rosbag2 is needed and damaged, or a definition of ROS is.
     """
     topics = {
         topic_id: _read_topic(channel, schemas.get(channel.schema_id))
@@ -55,7 +59,7 @@ def read_topics(
             topic_id: topic if topic.type_name else replace(topic, type_name=types.get(topic.name, ""))
             for topic_id, topic in topics.items()
         }
-    definitions = _ros_definitions(metadata)
+    definitions = _ros_definitions(metadata, path)
     return {
         topic_id: _with_ros_definition(topic, channels[topic_id].schema_id, definitions)
         for topic_id, topic in topics.items()
@@ -99,11 +103,9 @@ def write_channel(topic: Topic, topic_id: int, schema_id: int) -> Channel:
 def write_ros_definition(definition: RecordedDefinition) -> str:
     """Return ROS's definition of a type as a value of the metadata record."""
     try:
-        text = definition.data.decode()
-    except UnicodeDecodeError:
-        # Comments of old packages; every byte is some letter of Latin 1.
-        text = definition.data.decode("latin-1")
-    return f"{definition.encoding}\n{text}"
+        return f"{definition.encoding}\n{definition.data.decode()}"
+    except UnicodeDecodeError:  # in the comments of old packages
+        return f"{definition.encoding}{_BASE64}\n{b64encode(definition.data).decode()}"
 
 
 def _ros_name(serialization_format: str, schema_name: str) -> str:
@@ -135,14 +137,19 @@ def _read_topic(channel: Channel, schema: Schema | None) -> Topic:
     )
 
 
-def _ros_definitions(metadata: Iterable[Metadata]) -> dict[str, RecordedDefinition]:
+def _ros_definitions(metadata: Iterable[Metadata], path: str) -> dict[str, RecordedDefinition]:
     """Return ROS's definitions by the names of the types."""
     definitions = {}
     for record in metadata:
         if record.name == ROS_DEFINITIONS:
             for type_name, value in record.metadata.items():
                 encoding, _, text = value.partition("\n")
-                definitions[type_name] = RecordedDefinition(encoding, text.encode())
+                is_base64 = encoding.endswith(_BASE64)
+                try:
+                    data = b64decode(text, validate=True) if is_base64 else text.encode()
+                except ValueError as error:
+                    raise BagError(f"{path}: the ROS definition of {type_name} is damaged: {error}") from None
+                definitions[type_name] = RecordedDefinition(encoding.removesuffix(_BASE64), data)
     return definitions
 
 

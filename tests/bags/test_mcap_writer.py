@@ -207,10 +207,14 @@ def test_several_definitions_of_one_type_are_kept_for_the_way_back() -> None:
     assert list(reader_of(write_topics(topics)).topics.values()) == topics
 
 
-def test_a_definition_with_letters_of_old_code_pages_is_kept_as_text() -> None:
+def test_a_definition_with_letters_of_old_code_pages_is_kept_as_it_is() -> None:
     topic = replace(PROTOBUF, ros_definition=RecordedDefinition("ros2msg", b"# Gr\xf6\xdfe\nstring data\n"))
-    (read,) = reader_of(write_topics([topic])).topics.values()
-    assert read.ros_definition == RecordedDefinition("ros2msg", "# Größe\nstring data\n".encode())
+    data = write_topics([topic])
+    (read,) = reader_of(data).topics.values()
+    assert read.ros_definition == topic.ros_definition
+    with pytest.raises(BagError) as caught:
+        reader_of(data.replace(b" base64\nIyB", b" base64\n?yB"))
+    assert str(caught.value).startswith("a.mcap: the ROS definition of std_msgs/msg/String is damaged: ")
 
 
 def test_empty_chunks_are_not_written() -> None:
