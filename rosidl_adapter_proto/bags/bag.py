@@ -6,7 +6,6 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.decoding import decoder
 from rosidl_adapter_proto.bags.message import BagMessage, MessageSource
-from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
+from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic, missing_topic
 from rosidl_adapter_proto.bags.order import Run, in_time_order
 from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
@@ -315,13 +314,7 @@ class Bag:
         names = [topics] if isinstance(topics, str) else list(topics)
         for name in names:
             if name not in self.topics:
-                near = get_close_matches(name, self.topics, n=3)
-                known = (
-                    f"did you mean {' or '.join(near)}?"
-                    if near
-                    else f"there are {', '.join(self.topics) or 'none'}"
-                )
-                raise BagError(f"{self.path}: there is no topic {name}; {known}")
+                raise BagError(missing_topic(self.path, name, self.topics))
         return names
 
     def _check_open(self) -> None:

@@ -13,7 +13,7 @@ from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Prog
 from rosidl_adapter_proto.bags.convert_file import FileTask
 from rosidl_adapter_proto.bags.description import WrittenFile, describe
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE, write_metadata
-from rosidl_adapter_proto.bags.model import Topic
+from rosidl_adapter_proto.bags.model import Topic, missing_topic
 from rosidl_adapter_proto.bags.output import check_new, written_aside
 from rosidl_adapter_proto.bags.places import Place, file_size, find_place
 from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFIXES, ZSTD_SUFFIX
@@ -149,7 +149,7 @@ def convert_with(
     recording = find_recording(str(source))
     storage, is_folder = _form(recording, destination, settings)
     topics = _topics(recording)
-    _check_names([*settings.topics, *settings.excluded_topics], topics)
+    _check_names(recording.path, [*settings.topics, *settings.excluded_topics], topics)
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
     Converter(source_format, target_format, settings.registry)  # that there is none is said before all else
@@ -224,11 +224,11 @@ def _topics(recording: Recording) -> list[Topic]:
     return topics
 
 
-def _check_names(patterns: Sequence[str], topics: Sequence[Topic]) -> None:
+def _check_names(path: str, patterns: Sequence[str], topics: Sequence[Topic]) -> None:
     names = sorted({topic.name for topic in topics})
     for pattern in patterns:
         if not any(name == pattern or fnmatchcase(name, pattern) for name in names):
-            raise RequestError(f"no topic is called {pattern}; there are {', '.join(names) or 'none'}")
+            raise RequestError(missing_topic(path, pattern, names))
 
 
 def _names(recording: Recording, storage: str) -> list[str]:

@@ -115,7 +115,7 @@ def test_errors(run: Run, arguments: list[str], text: str) -> None:
         ),
         (["--threads", "0"], "0 is not in the range"),
         (["--on-error", "ignore"], "'ignore' is not one of 'stop', 'skip', 'copy'"),
-        (["--topic", "/b"], "no topic is called /b; there are /a"),
+        (["--topic", "/b"], "Error: in.mcap: there is no topic /b; there are /a"),
     ],
 )
 def test_usage(run: Run, arguments: list[str], text: str) -> None:

@@ -34,7 +34,10 @@ def command(
     chosen = chosen_fields(fields or ())
     with open_bag(bag, include=include, distro=distro) as opened:
         messages = opened.messages(topics, start=start, end=end, fields=fields)
-        for recorded in islice(messages, limit):
+        count = 0
+        for count, recorded in enumerate(islice(messages, limit), start=1):
             click.echo(message_json(recorded, chosen))
+        if not count and limit != 0:
+            click.echo("Warning: there are no messages of these topics and times", err=True)
         for warning in opened.warnings:
             click.echo(f"Warning: {warning}", err=True)
