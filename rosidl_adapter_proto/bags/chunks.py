@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -21,6 +22,7 @@ from rosidl_adapter_proto.transcode.records import (
     Failure,
     RecordConverter,
     Route,
+    pack_records,
     read_records,
 )
 
@@ -85,7 +87,7 @@ class ConvertedChunk:
         source: The chunk that it was.
         packed: What is to be written; None if no message is left.
         failures: The messages that could not be converted.
-        damage: Why the chunk could not be read; it then has nothing else.
+        damage: Why the chunk, or some of its messages, could not be read.
     """
 
     source: StoredChunk
@@ -97,6 +99,7 @@ class ConvertedChunk:
 def convert_chunk(
     chunk: StoredChunk,
     converter: ChunkConverter,
+    topic_ids: Collection[int],
     writer: StorageWriter,
     start_time: int,
     end_time: int | None,
@@ -106,20 +109,46 @@ def convert_chunk(
     Args:
         chunk: The chunk.
         converter: What converts its records.
+        topic_ids: The ids of the topics in the file: only of those there should be messages.
         writer: What it will be written with.
         start_time: The first time of recording to convert.
         end_time: The first time not to convert any more; None for no end.
     """
+    damage = None
     try:
         records = records_of(chunk)
-        converted = converter.convert(records, start_time=start_time, end_time=end_time)
+        try:
+            converted = converter.convert(records, start_time=start_time, end_time=end_time)
+        except RecordsError:
+            records, damage = _of_known_topics(records, topic_ids, chunk.where)
+            converted = converter.convert(records, start_time=start_time, end_time=end_time)
     except BagError as error:
         return ConvertedChunk(chunk, damage=error)
     except RecordsError as error:
         return ConvertedChunk(chunk, damage=BagError(f"{chunk.where}: {error}"))
     packed = writer.pack(converted.data) if converted.message_count else None
     failures = _in_topics(records, converted.failures, start_time, end_time) if converted.failures else ()
-    return ConvertedChunk(chunk, packed, failures)
+    return ConvertedChunk(chunk, packed, failures, damage)
+
+
+def _of_known_topics(data: Buffer, topic_ids: Collection[int], where: str) -> tuple[Buffer, BagError | None]:
+    """Return the messages of a chunk whose topics there are, and what is wrong with the others, if there are any.
+
+    Raises:
+        RecordsError: The chunk is damaged.
+    """
+    unknown = Counter(read_records(data).topic_ids)
+    for topic_id in topic_ids:
+        del unknown[topic_id]
+    if not unknown:
+        return data, None
+    known = read_records(data, topic_ids)
+    messages = [known[index] for index in range(len(known))]
+    packed = pack_records(known.topic_ids, known.sequences, known.log_times, known.publish_times, messages)
+    return packed, BagError(
+        f"{where}: {unknown.total()} messages are of topics that are not in the file, such as one with the id "
+        f"{min(unknown)}"
+    )
 
 
 def _in_topics(

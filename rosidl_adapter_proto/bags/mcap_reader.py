@@ -23,6 +23,7 @@ from rosidl_adapter_proto.bags.mcap_contents import (
 from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, Place
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
+from rosidl_adapter_proto.bags.storage import MCAP
 from rosidl_adapter_proto.errors import BagError
 
 _SALVAGE = "`--on-error skip` reads"
@@ -49,12 +50,13 @@ class McapReader:
         BagError: The file is no MCAP file; or it is damaged, and not to be salvaged.
     """
 
-    storage = "mcap"
+    storage = MCAP
 
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path
         self.is_damaged = False
         self._warnings: dict[str, None] = {}
+        self._unknown: dict[int, int] = {}  # where the first records of unknown kinds are
         self._file = McapFile(file, path)
         self._salvage = salvage
         self.profile = self._read_header().profile
@@ -186,8 +188,11 @@ class McapReader:
     def _check(self, place: Place) -> None:
         """Compare a record with what is known of the file."""
         where = self._file.where(place.start)
-        if place.opcode not in KNOWN_OPCODES:
-            self._warn(f"{where}: {place.name} is left out")
+        if (
+            place.opcode not in KNOWN_OPCODES
+            and self._unknown.setdefault(place.opcode, place.start) == place.start
+        ):
+            self._warn(f"{where}: {place.name} is left out, and so are all others of it")
         if place.opcode not in DEFINITIONS:
             return
         channels = self._contents.channels

@@ -7,9 +7,8 @@ and written by the native module: nothing in Python looks at a message while a b
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -135,17 +134,3 @@ class StoredChunk:
     end_time: int
     message_count: int | None = None
     position: int = 0
-
-
-def missing_topic(path: str, name: str, names: Iterable[str]) -> str:
-    """Return what to say of a topic that a recording does not have.
-
-    Args:
-        path: The recording.
-        name: What it was asked for.
-        names: The topics that it has.
-    """
-    known = sorted(names)
-    near = get_close_matches(name, known, n=3)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(known) or 'none'}"
-    return f"{path}: there is no topic {name}; {hint}"

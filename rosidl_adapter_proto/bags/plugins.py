@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
 from rosidl_adapter_proto.converters import Converter, SerializedBagMessage
 from rosidl_adapter_proto.errors import Error
+from rosidl_adapter_proto.transcode.error import RecordsError
 from rosidl_adapter_proto.transcode.records import Converted, Failure, Records, pack_records, read_records
 
 if TYPE_CHECKING:
@@ -36,6 +37,9 @@ class PluginConverter:
     def convert(self, data: Buffer, *, start_time: int = 0, end_time: int | None = None) -> Converted:
         """Do what `RecordConverter.convert` does."""
         records = read_records(data)
+        unknown = set(records.topic_ids) - self._routes.keys()
+        if unknown:
+            raise RecordsError(0, f"there is no route for topic id {min(unknown)}")
         chosen = [
             index
             for index, (topic_id, time) in enumerate(zip(records.topic_ids, records.log_times, strict=True))

@@ -16,8 +16,10 @@ from mcap.writer import CompressionType
 from rosidl_adapter_proto.bags.bag import open_bag
 from rosidl_adapter_proto.bags.conversion import ConversionResult, Counts
 from rosidl_adapter_proto.bags.convert import convert_bag
+from rosidl_adapter_proto.converters import ConverterRegistry
 from rosidl_adapter_proto.errors import BagError, ConverterError, Error, RequestError
 from tests.bags.recordings import START, STRING, Recorded, contents, mcap_bytes, rows, string_cdr, strings
+from tests.converters.plugins import JsonConverter
 
 pytestmark = pytest.mark.usefixtures("folder")
 
@@ -302,6 +304,46 @@ def test_what_is_not_damaged_is_converted(on_error: str, where: int) -> None:
     assert len(contents(Path("out.mcap")).messages) == 23 - lost
 
 
+def with_an_unknown_topic() -> bytes:
+    """Return a file with a message of a channel that is not there."""
+    data = bytearray(
+        mcap_bytes(strings("/a", 9), compression=CompressionType.NONE, chunk_size=150, enable_crcs=False)
+    )
+    data[data.index(b"/a 5") - 30] = 77  # the channel stands in front of sequence number, times and CDR
+    return bytes(data)
+
+
+@pytest.mark.parametrize("target_format", ["protobuf", "json"])
+def test_a_message_of_a_topic_that_is_not_there(target_format: str) -> None:
+    registry = ConverterRegistry()
+    registry.register("json_converter", JsonConverter)
+    options: dict[str, Any] = {"target_format": target_format, "registry": registry}
+    reason = (
+        r"in\.mcap at byte \d+: 1 messages are of topics that are not in the file, such as one with the id 77"
+    )
+    assert re.match(
+        rf"{reason}; \d messages before that are whole", refused(with_an_unknown_topic(), **options)
+    )
+
+    result = convert(with_an_unknown_topic(), on_error="skip", **options)
+    assert result.total == Counts(converted=8, lost=1) and not result.is_complete
+    assert re.fullmatch(reason, result.warnings[0])
+    kept = [each.sequence for each in strings("/a", 9)]
+    del kept[5]
+    assert [each.sequence for each in contents(Path("out.mcap")).messages] == kept
+
+
+def test_reading_finds_another_number_of_messages() -> None:
+    Path("in.mcap").write_bytes(with_an_unknown_topic())
+    with pytest.raises(BagError) as caught:
+        list(open_bag("in.mcap").messages("/a"))
+    assert str(caught.value) == (
+        "in.mcap: it says that there are 9 messages of these topics, but 8 were found; "
+        "`bag convert --on-error skip` makes a bag of those"
+    )
+    assert len(list(open_bag("in.mcap").messages("/a", start=1))) == 8
+
+
 def test_a_truncated_file() -> None:
     whole = mcap_bytes(strings("/a", 40), compression=CompressionType.NONE)
     cut = whole[: len(whole) // 2]
@@ -373,7 +415,7 @@ def test_no_converter() -> None:
             "files of sqlite3 are not compressed; leave --compression out, or write mcap",
         ),
         ("out.bag", {}, "storage 'rosbag_v2' cannot be written; mcap and sqlite3 can"),
-        ("out", {"topics": ["/a", "a"]}, "in: there is no topic a; did you mean /a?"),
+        ("out", {"topics": ["/a", "a"]}, "there is no topic a; did you mean /a?"),
     ],
 )
 def test_what_does_not_fit(destination: str, options: dict[str, Any], text: str) -> None:

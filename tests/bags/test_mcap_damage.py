@@ -347,9 +347,11 @@ def test_records_of_unknown_kinds_are_left_out() -> None:
     record = b"\x83" + struct.pack("<Q", 4) + b"what"
     data = mcap_file(**NO_SUMMARY)
     place = places(data, Opcode.CHUNK)[2].start
-    reader = reader_of(insert(data, place, record))
+    reader = reader_of(insert(data, place, record * 3))
     assert tuple(messages_of(reader)) == MESSAGES
-    assert reader.warnings[1:] == [f"a.mcap at byte {place}: a record of the unknown kind 0x83 is left out"]
+    assert reader.warnings[1:] == [
+        f"a.mcap at byte {place}: a record of the unknown kind 0x83 is left out, and so are all others of it"
+    ]
 
 
 class Broken(BytesIO):
@@ -402,7 +404,8 @@ def test_a_channel_that_the_summary_does_not_have() -> None:
     statistics = places(data, Opcode.STATISTICS)[0]
     hidden = change(data, channel.start, b"\x83")
     hidden = whole(change(hidden, statistics.content + 10, struct.pack("<I", 2)))
-    unknown = f"a.mcap at byte {channel.start}: a record of the unknown kind 0x83 is left out"
+    place = f"a.mcap at byte {channel.start}"
+    unknown = f"{place}: a record of the unknown kind 0x83 is left out, and so are all others of it"
     assert salvaged(hidden) == (40, ["a.mcap: channel 3 (`/c`) is not in the summary", unknown])
 
 

@@ -10,7 +10,7 @@ import pytest
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, JOINT_STATES, TF, record
 from rosidl_adapter_proto.cli.commands.bag.info import _rate
-from rosidl_adapter_proto.cli.conversion_report import size_text
+from rosidl_adapter_proto.cli.texts import size_text
 from tests.cli.conftest import Run
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rosidl_adapter_proto.cli.conversion_report import size_text
 from rosidl_adapter_proto.cli.options import bag_source_options
+from rosidl_adapter_proto.cli.texts import show_warnings, size_text
 from rosidl_adapter_proto.time import to_datetime
 
 if TYPE_CHECKING:
@@ -67,8 +67,7 @@ def _print(information: BagInformation) -> None:
     for topic, kind, format_name, count, rate, origin in [head, *table]:
         left = f"{topic:{widths[0]}}  {kind:{widths[1]}}  {format_name:{widths[2]}}"
         click.echo(f"{left}  {count:>{widths[3]}}  {rate:>{widths[4]}}  {origin}")
-    for warning in information.warnings:
-        click.echo(f"Warning: {warning}", err=True)
+    show_warnings(information.warnings)
 
 
 def _rate(count: int, duration: int) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
+from rosidl_adapter_proto.cli.texts import show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 
@@ -23,7 +24,7 @@ from rosidl_adapter_proto.errors import RequestError
     type=click.Choice(["parquet", "arrow", "csv"]),
     help="What to write, where the suffix of FILE does not say.",
 )
-@fields_option("Only these fields of the messages.")
+@fields_option
 @time_options
 @bag_source_options
 def command(
@@ -63,8 +64,7 @@ def command(
                 end=end,
                 progress=progress,
             )
-        for warning in opened.warnings:
-            click.echo(f"Warning: {warning}", err=True)
+        show_warnings(opened.warnings)
     click.echo(f"{output}: {rows} rows")
 
 
