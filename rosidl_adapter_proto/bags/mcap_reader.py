@@ -26,7 +26,7 @@ from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, S
 from rosidl_adapter_proto.bags.storage import MCAP
 from rosidl_adapter_proto.errors import BagError
 
-_SALVAGE = "`--on-error skip` reads"
+_SALVAGE = "`bag convert --on-error skip` reads"
 
 _Chunk = TypeVar("_Chunk", ChunkPlace, StoredChunk)
 

@@ -264,7 +264,7 @@ def test_messages_that_cannot_be_decompressed_are_said(tmp_path: Path, data: byt
     _describe(tmp_path, "a.db3", compression_mode="MESSAGE", compression_format="zstd")
     reason = f"{path}, table messages, rows 1 to 2: a message of /a, recorded at 1, cannot be decompressed: "
     with pytest.raises(
-        BagError, match=f"^{re.escape(reason + expected)}.*; `--on-error skip` leaves .* out$"
+        BagError, match=f"^{re.escape(reason + expected)}.*; `bag convert --on-error skip` leaves .* out$"
     ):
         _read(tmp_path)
     with find_recording(str(tmp_path)).open(0, salvage=True) as reader:
@@ -309,11 +309,19 @@ def test_what_is_no_recording_is_said(tmp_path: Path, name: str) -> None:
 def test_where_nothing_is_nothing_is_found(tmp_path: Path) -> None:
     for path, expected in (
         (tmp_path / "nothing", "no such file or folder"),
-        (tmp_path, "no metadata.yaml that names files, and no .mcap, .db3, .bag files in it"),
+        (tmp_path, "no metadata.yaml that names files, and no .mcap or .db3 or .bag file in it"),
     ):
         with pytest.raises(BagError) as caught:
             find_recording(str(path))
         assert str(caught.value) == f"{path}: {expected}"
+
+
+def test_metadata_is_no_bag(tmp_path: Path) -> None:
+    path = tmp_path / "metadata.yaml"
+    path.write_text("rosbag2_bagfile_information: {}")
+    with pytest.raises(BagError) as caught:
+        find_recording(str(path))
+    assert str(caught.value) == f"{path}: describes a bag; name the folder that it is in"
 
 
 def test_compressed_files_may_have_many_frames(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.shell_completion import ShellComplete
 from google.protobuf import any_pb2
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.writer import Writer
@@ -17,6 +18,7 @@ from mcap.writer import Writer
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, SMALL_IMAGE, START, TF, record
 from rosidl_adapter_proto import open_bag
+from rosidl_adapter_proto.cli import program
 from tests.cli.conftest import Outcome, Run
 
 
@@ -90,6 +92,13 @@ def test_chosen_fields(run: Run, fields: str, expected: object) -> None:
     assert line["message"] == (whole if expected is None else expected)
 
 
+def test_fields_that_are_given_one_by_one(run: Run) -> None:
+    options = ["--fields", "header.stamp.nanosec", "--fields", "width,height"]
+    (line,) = lines(run("bag", "cat", "bag.mcap", "/camera/image", "--limit", "1", *options))
+
+    assert line["message"] == {"header": {"stamp": {"nanosec": 0}}, "height": 48, "width": 64}
+
+
 def test_chosen_fields_of_elements(run: Run) -> None:
     (line,) = lines(
         run("bag", "cat", "bag.mcap", "/tf", "--limit", "1", "--fields", "transforms.child_frame_id")
@@ -106,7 +115,6 @@ def test_chosen_fields_of_elements(run: Run) -> None:
         ("2023-11-14T22:13:20.990000001Z", "2023-11-14T22:13:21.000000001Z", START + 995_000_000, 2),
         (str(START + 10**9), str(START + 1_005_000_000), START + 10**9, 1),
         (None, str(START + 10_000_000), START, 2),
-        ("2030-01-01T00:00:00Z", None, None, 0),
     ],
 )
 def test_chosen_times(run: Run, start: str | None, end: str | None, first: int | None, count: int) -> None:
@@ -118,6 +126,14 @@ def test_chosen_times(run: Run, start: str | None, end: str | None, first: int |
 
     assert len(printed) == count
     assert [line["log_time"] for line in printed[:1]] == ([] if first is None else [first])
+
+
+def test_no_messages(run: Run) -> None:
+    ended = run("bag", "cat", "bag.mcap", "/imu", "--start", "2030-01-01T00:00:00Z")
+
+    warning = "Warning: there are no messages of these topics and times\n"
+    assert (ended.code, ended.out, ended.err) == (0, "", warning)
+    assert lines(run("bag", "cat", "bag.mcap", "/imu", "--limit", "0")) == []
 
 
 @pytest.mark.parametrize("time", ["yesterday", "2023-11-14", "2023-02-30T00:00:00Z", "-1", "1.5"])
@@ -177,6 +193,27 @@ def test_what_json_has_no_words_for(folder: Path, run: Run) -> None:
     assert line["message"]["linear_acceleration"]["x"] == "NaN"
     assert line["message"]["linear_acceleration"]["y"] == "-Infinity"
     assert line["message"]["header"]["frame_id"] == "ü\n"
+
+
+def test_what_is_odd_about_the_bag_is_a_warning(folder: Path, run: Run) -> None:
+    (folder / "folder").mkdir()
+    (folder / "bag.mcap").rename("folder/bag.mcap")
+
+    ended = run("bag", "cat", "folder", "/imu", "--limit", "1")
+
+    assert (ended.code, len(ended.out.splitlines())) == (0, 1)
+    assert ended.err.startswith("Warning: folder: no metadata.yaml; the files found")
+
+
+@pytest.mark.parametrize(
+    "before", [["cat", "bag.mcap"], ["table", "bag.mcap"], ["convert", "bag.mcap", "--topic"]]
+)
+@pytest.mark.parametrize(("typed", "expected"), [("/", ["/camera/image", "/imu", "/tf"]), ("/i", ["/imu"])])
+def test_topics_are_completed(before: list[str], typed: str, expected: list[str]) -> None:
+    complete = ShellComplete(program, {}, "rosidl-proto", "_COMPLETE")
+
+    assert [item.value for item in complete.get_completions(["bag", *before], typed)] == expected
+    assert complete.get_completions(["bag", before[0], "none", *before[2:]], typed) == []
 
 
 def test_a_pipe_that_closes(bag: Path) -> None:
