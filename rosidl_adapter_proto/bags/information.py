@@ -20,7 +20,7 @@ class BagTopicInformation:
 
     Attributes:
         name: Its name.
-        type_name: The ROS type of its messages.
+        type_name: The ROS type of its messages; where they have none, what the recording calls their type.
         serialization_format: How they are serialized.
         message_count: How many there are.
         types_from: Where the definition of the type comes from, for people; `MISSING` without one.
@@ -105,5 +105,9 @@ def _topic_information(bag: Bag, topic: BagTopic, warnings: dict[str, None]) -> 
         types_from = MISSING
         warnings[str(error)] = None
     return BagTopicInformation(
-        topic.name, topic.type_name, topic.serialization_format, topic.message_count, types_from
+        topic.name,
+        topic.type_name or topic.schema_name,
+        topic.serialization_format,
+        topic.message_count,
+        types_from,
     )

@@ -151,7 +151,7 @@ class RemotePath:
             from fsspec.core import url_to_fs
         except ImportError:
             raise RequestError(
-                f"{self}: URLs need fsspec; `pip install rosidl-adapter-proto[remote]`"
+                f"{self}: URLs need fsspec; `pip install 'rosidl-adapter-proto[remote]'`"
             ) from None
         try:
             found: tuple[Any, str] = url_to_fs(self.url)

@@ -39,7 +39,7 @@ def ray_workers(
     try:
         import ray as library
     except ImportError:
-        raise RequestError("Ray is not installed; `pip install rosidl-adapter-proto[ray]`") from None
+        raise RequestError("Ray is not installed; `pip install 'rosidl-adapter-proto[ray]'`") from None
     ray: Any = library
     connected = not ray.is_initialized()
     if connected:

@@ -92,6 +92,8 @@ def find_recording(path: str) -> Recording:
         raise BagError(f"{path}: no such file or folder")
     if not place.is_file():
         raise BagError(f"{path}: neither a file nor a folder, but a pipe or a device; copy it to a file")
+    if place.name == METADATA_FILE:
+        raise BagError(f"{path}: describes a bag; name the folder that it is in")
     file = recognize(path)
     metadata, warnings = _metadata_beside(place)
     return Recording(path, (file,), metadata, warnings)
@@ -108,7 +110,7 @@ def _folder(folder: Place) -> Recording:
         return _listed_files(folder, metadata, present)
     if not present:
         raise BagError(
-            f"{folder}: no {METADATA_FILE} that names files, and no {', '.join(SUFFIXES)} files in it"
+            f"{folder}: no {METADATA_FILE} that names files, and no {' or '.join(SUFFIXES)} file in it"
         )
     files = _by_start_time([recognize(str(path)) for path in present])
     names = ", ".join(find_place(file.path).name for file in files)

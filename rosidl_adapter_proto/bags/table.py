@@ -1,6 +1,6 @@
 """Topics of bags as tables: record batches of Arrow, and files of them.
 
-Needs pyarrow: `pip install rosidl-adapter-proto[tables]`.
+Needs pyarrow: `pip install 'rosidl-adapter-proto[tables]'`.
 """
 
 from __future__ import annotations

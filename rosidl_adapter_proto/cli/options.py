@@ -38,6 +38,18 @@ def complete_name(context: click.Context, parameter: click.Parameter, incomplete
     return sorted(name for name in names if name.startswith(incomplete))
 
 
+def complete_topic(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Return the topics that begin with what was typed, of the bag that stands before it."""
+    from rosidl_adapter_proto.bags.bag import open_bag
+
+    # Behind an option that waits for its value, click leaves the arguments where it found them.
+    places = [context.params.get("bag"), *(context.params.get("places") or context.args)]
+    try:
+        return [name for name in open_bag(next(filter(None, places))).topics if name.startswith(incomplete)]
+    except (StopIteration, Error):
+        return []
+
+
 _COMPLETIONS = {"distro": complete_distro}
 _PATH = click.Path(path_type=Path)
 _TYPES: dict[Kind, Any] = {
@@ -114,14 +126,14 @@ def time_options(command: Command) -> Command:
     return start(end(command))
 
 
-def _names(context: click.Context, parameter: click.Parameter, text: str | None) -> list[str] | None:
-    return None if text is None else [name.strip() for name in text.split(",")]
+def fields_option(help_text: str) -> Callable[[Command], Command]:
+    """Return the decorator that adds the option of chosen fields; they reach the command as a list, or None."""
 
+    def names(context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> list[str] | None:
+        return [name.strip() for text in texts for name in text.split(",")] or None
 
-def fields_option(command: Command) -> Command:
-    """Add the option that chooses fields of messages; they reach the command as a list of names, or None."""
-    help_text = "Only these fields of the messages."
-    return click.option("--fields", metavar="A.B,C", callback=_names, help=help_text)(command)
+    help_text = f"{help_text} May be repeated."
+    return click.option("--fields", metavar="A.B,C", multiple=True, callback=names, help=help_text)
 
 
 def plugin_option(command: Callable[..., Any]) -> Callable[..., Any]:

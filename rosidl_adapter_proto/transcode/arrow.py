@@ -1,6 +1,6 @@
 """Serialized messages as Arrow record batches, without a message object in between.
 
-This needs pyarrow: `pip install rosidl-adapter-proto[tables]`.
+This needs pyarrow: `pip install 'rosidl-adapter-proto[tables]'`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ try:
     import pyarrow as pa
 except ImportError as error:
     raise ImportError(
-        f"tables need pyarrow ({error}); pip install rosidl-adapter-proto[tables]", name="pyarrow"
+        f"tables need pyarrow ({error}); pip install 'rosidl-adapter-proto[tables]'", name="pyarrow"
     ) from error
 
 if TYPE_CHECKING:

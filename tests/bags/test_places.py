@@ -269,7 +269,7 @@ def test_fsspec_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(builtins, "__import__", importing)
     with pytest.raises(RequestError) as error:
         open_bag("s3://bucket/a")
-    assert str(error.value) == "s3://bucket/a: URLs need fsspec; `pip install rosidl-adapter-proto[remote]`"
+    assert str(error.value) == "s3://bucket/a: URLs need fsspec; `pip install 'rosidl-adapter-proto[remote]'`"
 
 
 def test_paths_do_not_need_fsspec() -> None:

@@ -309,11 +309,19 @@ def test_what_is_no_recording_is_said(tmp_path: Path, name: str) -> None:
 def test_where_nothing_is_nothing_is_found(tmp_path: Path) -> None:
     for path, expected in (
         (tmp_path / "nothing", "no such file or folder"),
-        (tmp_path, "no metadata.yaml that names files, and no .mcap, .db3, .bag files in it"),
+        (tmp_path, "no metadata.yaml that names files, and no .mcap or .db3 or .bag file in it"),
     ):
         with pytest.raises(BagError) as caught:
             find_recording(str(path))
         assert str(caught.value) == f"{path}: {expected}"
+
+
+def test_metadata_is_no_bag(tmp_path: Path) -> None:
+    path = tmp_path / "metadata.yaml"
+    path.write_text("rosbag2_bagfile_information: {}")
+    with pytest.raises(BagError) as caught:
+        find_recording(str(path))
+    assert str(caught.value) == f"{path}: describes a bag; name the folder that it is in"
 
 
 def test_compressed_files_may_have_many_frames(tmp_path: Path) -> None:

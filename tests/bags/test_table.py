@@ -411,6 +411,19 @@ def test_command(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     )
 
 
+def test_no_table_to_the_standard_output(
+    path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(path.parent)
+    with pytest.raises(SystemExit) as caught:
+        main(["bag", "table", str(path), "/imu", "--output", "-", "--format", "csv"])
+    assert (caught.value.code, capsys.readouterr()) == (
+        2,
+        ("", "Error: a table cannot go to the standard output; name a file\n"),
+    )
+    assert not Path("-").exists()
+
+
 def test_without_pyarrow(path: Path) -> None:
     program = (
         "import sys; sys.modules['pyarrow'] = None\n"
@@ -421,5 +434,5 @@ def test_without_pyarrow(path: Path) -> None:
     assert (done.returncode, done.stderr) == (
         2,
         "Error: tables need pyarrow (import of pyarrow halted; None in sys.modules); pip install "
-        "rosidl-adapter-proto[tables]\n",
+        "'rosidl-adapter-proto[tables]'\n",
     )

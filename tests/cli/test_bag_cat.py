@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.shell_completion import ShellComplete
 from google.protobuf import any_pb2
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.writer import Writer
@@ -17,6 +18,7 @@ from mcap.writer import Writer
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, SMALL_IMAGE, START, TF, record
 from rosidl_adapter_proto import open_bag
+from rosidl_adapter_proto.cli import program
 from tests.cli.conftest import Outcome, Run
 
 
@@ -88,6 +90,13 @@ def test_chosen_fields(run: Run, fields: str, expected: object) -> None:
         "width": 64,
     }
     assert line["message"] == (whole if expected is None else expected)
+
+
+def test_fields_that_are_given_one_by_one(run: Run) -> None:
+    options = ["--fields", "header.stamp.nanosec", "--fields", "width,height"]
+    (line,) = lines(run("bag", "cat", "bag.mcap", "/camera/image", "--limit", "1", *options))
+
+    assert line["message"] == {"header": {"stamp": {"nanosec": 0}}, "height": 48, "width": 64}
 
 
 def test_chosen_fields_of_elements(run: Run) -> None:
@@ -177,6 +186,27 @@ def test_what_json_has_no_words_for(folder: Path, run: Run) -> None:
     assert line["message"]["linear_acceleration"]["x"] == "NaN"
     assert line["message"]["linear_acceleration"]["y"] == "-Infinity"
     assert line["message"]["header"]["frame_id"] == "ü\n"
+
+
+def test_what_is_odd_about_the_bag_is_a_warning(folder: Path, run: Run) -> None:
+    (folder / "folder").mkdir()
+    (folder / "bag.mcap").rename("folder/bag.mcap")
+
+    ended = run("bag", "cat", "folder", "/imu", "--limit", "1")
+
+    assert (ended.code, len(ended.out.splitlines())) == (0, 1)
+    assert ended.err.startswith("Warning: folder: no metadata.yaml; the files found")
+
+
+@pytest.mark.parametrize(
+    "before", [["cat", "bag.mcap"], ["table", "bag.mcap"], ["convert", "bag.mcap", "--topic"]]
+)
+@pytest.mark.parametrize(("typed", "expected"), [("/", ["/camera/image", "/imu", "/tf"]), ("/i", ["/imu"])])
+def test_topics_are_completed(before: list[str], typed: str, expected: list[str]) -> None:
+    complete = ShellComplete(program, {}, "rosidl-proto", "_COMPLETE")
+
+    assert [item.value for item in complete.get_completions(["bag", *before], typed)] == expected
+    assert complete.get_completions(["bag", before[0], "none", *before[2:]], typed) == []
 
 
 def test_a_pipe_that_closes(bag: Path) -> None:

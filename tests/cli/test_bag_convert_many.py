@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 from io import StringIO
 from pathlib import Path
@@ -61,7 +62,8 @@ def test_going_on(run: Run) -> None:
 
 
 def test_one_bag_that_fits_a_pattern_goes_into_a_folder_too(run: Run) -> None:
-    assert run("bag", "convert", "in/a*", "out").code == 0
+    ended = run("bag", "convert", "in/a*", "out")
+    assert (ended.code, ended.err) == (0, "") and "\n1 bag: 1 converted; in " in ended.out
     assert Path("out/a.mcap").is_file()
 
 
@@ -74,17 +76,23 @@ def test_one_bag_with_jobs(run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["x*", "out"], 2, "Error: no bag fits x*\n"),
+        (["y*", "out"], 2, "Error: no bag fits y*\n"),
         (["in/a.mcap", "./in/a.mcap", "out"], 0, ""),
         (
             ["in", "x/in", "out"],
             2,
             "Error: in and x/in would both become out/in; convert them one after the other\n",
         ),
+        (
+            ["in", "out", "/a"],  # as with the `--topics` of rosbag2, behind which there may be several names
+            2,
+            "Error: out: no such file or folder; the last name is OUT, and all before it must exist\n",
+        ),
         (["nope://x", "out"], 2, "Error: nope://x: Protocol not known: nope\n"),
     ],
 )
 def test_before_anything_is_done(run: Run, arguments: list[str], code: int, message: str) -> None:
+    shutil.copytree("in", "x/in")
     ended = run("bag", "convert", *arguments)
     assert (ended.code, ended.err) == (code, message)
     assert Path("out").exists() == (not code)

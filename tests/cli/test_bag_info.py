@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, JOINT_STATES, TF, record
+from rosidl_adapter_proto.cli.commands.bag.info import _rate
 from rosidl_adapter_proto.cli.texts import size_text
 from tests.cli.conftest import Run
 
@@ -150,3 +151,38 @@ def test_no_bag(run: Run) -> None:
     ended = run("bag", "info", "no.mcap")
 
     assert (ended.code, ended.out, ended.err) == (3, "", "Error: no.mcap: no such file or folder\n")
+
+
+@pytest.mark.parametrize(
+    ("count", "seconds", "printed"),
+    [
+        (0, 1, ""),
+        (1, 0, ""),
+        (5, 3, "1.67 Hz"),
+        (999, 1, "999 Hz"),
+        (9996, 10, "1000 Hz"),
+        (123456, 1, "123456 Hz"),
+    ],
+)
+def test_rates(count: int, seconds: int, printed: str) -> None:
+    assert _rate(count, seconds * 10**9) == printed
+
+
+def test_protobuf_messages_of_other_programs(folder: Path, run: Run) -> None:
+    from google.protobuf import timestamp_pb2
+    from google.protobuf.descriptor_pb2 import FileDescriptorSet
+    from mcap.writer import Writer
+
+    files = FileDescriptorSet()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(files.file.add())
+    with Path("bag.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("google.protobuf.Timestamp", "protobuf", files.SerializeToString())
+        writer.add_message(writer.register_channel("/a", "protobuf", schema), 5, b"", 5)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+    ended = run("bag", "info", "bag.mcap")
+
+    assert ended.out.endswith("/a     google.protobuf.Timestamp  protobuf         1        nowhere\n")
+    assert ended.err.startswith("Warning: topic /a (google.protobuf.Timestamp): its messages are protobuf")

@@ -91,4 +91,4 @@ def test_ray_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(builtins, "__import__", importing)
     with pytest.raises(RequestError) as error, ray_workers():
         pass
-    assert str(error.value) == "Ray is not installed; `pip install rosidl-adapter-proto[ray]`"
+    assert str(error.value) == "Ray is not installed; `pip install 'rosidl-adapter-proto[ray]'`"

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, fields_option, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
 
 
-@click.command("cat")
+@click.command("cat", short_help="Print messages as JSON, one on each line.")
 @click.argument("bag", type=click.Path())
-@click.argument("topics", nargs=-1, required=True, metavar="TOPIC...")
-@fields_option
+@click.argument("topics", nargs=-1, required=True, metavar="TOPIC...", shell_complete=complete_topic)
+@fields_option("Print only these fields of the messages.")
 @time_options
 @click.option("--limit", type=click.IntRange(min=0), help="Print so many messages at most.")
 @bag_source_options
@@ -36,3 +36,5 @@ def command(
         messages = opened.messages(topics, start=start, end=end, fields=fields)
         for recorded in islice(messages, limit):
             click.echo(message_json(recorded, chosen))
+        for warning in opened.warnings:
+            click.echo(f"Warning: {warning}", err=True)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from rosidl_adapter_proto.cli.conversion_report import ProgressLine, show_outcome, show_outcomes, show_result
-from rosidl_adapter_proto.cli.options import bag_source_options, plugin_option, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, plugin_option, time_options
+from rosidl_adapter_proto.errors import RequestError
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.many import BagOutcome, BagTask
@@ -57,6 +58,7 @@ EXIT_SOME_FAILED = 3
     "topics",
     multiple=True,
     metavar="NAME",
+    shell_complete=complete_topic,
     help="Convert this topic alone, or those that fit a pattern such as '/camera/*'. May be repeated.",
 )
 @click.option(
@@ -64,6 +66,7 @@ EXIT_SOME_FAILED = 3
     "excluded_topics",
     multiple=True,
     metavar="NAME",
+    shell_complete=complete_topic,
     help="Leave out this topic, or those that fit a pattern. May be repeated.",
 )
 @time_options
@@ -130,15 +133,28 @@ def command(
     from rosidl_adapter_proto.bags.places import is_pattern
 
     *sources, destination = places
-    sources += filter(None, map(str.strip, listed or ()))
-    if not sources:
+    if not sources and not listed:
         raise click.UsageError("Missing argument 'OUT'.")
+    _check_sources(sources if len(sources) > 1 else ())
+    sources += filter(None, map(str.strip, listed or ()))
     many = listed or len(sources) > 1 or is_pattern(sources[0])
     tasks = plan_bags(sources, destination, options["storage"]) if many else []
     with _workers(jobs, ray, options["threads"], retries) as workers:
         if many:
             return _convert_bags(tasks, options, workers)
         return _convert_bag(sources[0], destination, options, workers)
+
+
+def _check_sources(sources: Iterable[str]) -> None:
+    """Refuse what is not there before anything is converted: a name behind OUT has made OUT one of the bags."""
+    from rosidl_adapter_proto.bags.places import RemotePath, find_place, is_pattern
+
+    for source in sources:
+        place = find_place(source)
+        if not is_pattern(source) and not isinstance(place, RemotePath) and not place.exists():
+            raise RequestError(
+                f"{source}: no such file or folder; the last name is OUT, and all before it must exist"
+            )
 
 
 def _workers(

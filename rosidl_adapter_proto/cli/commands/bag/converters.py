@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rosidl_adapter_proto.converters import ConverterRegistry
 
 
-@click.command("converters")
+@click.command("converters", short_help="List formats of messages, and their plugins.")
 @plugin_option
 def command(registry: ConverterRegistry) -> None:
     """List the serialization formats that bags are read and written in, and which plugins do it.

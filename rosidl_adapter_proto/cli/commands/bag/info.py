@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.information import BagInformation
 
 
-@click.command("info")
+@click.command("info", short_help="Tell what is in a bag.")
 @click.argument("bag", type=click.Path())
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for other programs.")
 @bag_source_options
@@ -57,7 +57,7 @@ def _print(information: BagInformation) -> None:
             each.type_name,
             each.serialization_format,
             str(each.message_count),
-            f"{each.message_count / duration * 1e9:.3g} Hz" if duration and each.message_count else "",
+            _rate(each.message_count, duration),
             each.types_from,
         )
         for each in information.topics
@@ -68,6 +68,13 @@ def _print(information: BagInformation) -> None:
         left = f"{topic:{widths[0]}}  {kind:{widths[1]}}  {format_name:{widths[2]}}"
         click.echo(f"{left}  {count:>{widths[3]}}  {rate:>{widths[4]}}  {origin}")
     show_warnings(information.warnings)
+
+
+def _rate(count: int, duration: int) -> str:
+    rate = count / duration * 1e9 if duration else 0.0
+    if not rate:
+        return ""
+    return f"{rate:.3g} Hz" if rate < 999.5 else f"{rate:.0f} Hz"
 
 
 def _date(nanoseconds: int) -> str:

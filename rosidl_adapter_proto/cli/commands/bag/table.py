@@ -9,14 +9,14 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, fields_option, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
 from rosidl_adapter_proto.cli.texts import show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 
-@click.command("table")
+@click.command("table", short_help="Write a topic as Parquet, Arrow or CSV.")
 @click.argument("bag", type=click.Path())
-@click.argument("topic")
+@click.argument("topic", shell_complete=complete_topic)
 @click.option("--output", "-o", required=True, type=click.Path(), metavar="FILE", help="The table.")
 @click.option(
     "--format",
@@ -24,7 +24,7 @@ from rosidl_adapter_proto.errors import RequestError
     type=click.Choice(["parquet", "arrow", "csv"]),
     help="What to write, where the suffix of FILE does not say.",
 )
-@fields_option
+@fields_option("Only these fields of the messages.")
 @time_options
 @bag_source_options
 def command(
@@ -49,6 +49,8 @@ def command(
         from rosidl_adapter_proto.bags.table import write_table
     except ImportError as error:
         raise RequestError(str(error)) from None
+    if output == "-":
+        raise RequestError("a table cannot go to the standard output; name a file")
     with open_bag(bag, include=include, distro=distro) as opened:
         found = opened.topics.get(topic)
         with _progress_bar(found.message_count if found else 0) as progress:
