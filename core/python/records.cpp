@@ -108,8 +108,13 @@ nb::tuple read_records(nb::handle data, nb::handle topic_ids, uint64_t start_tim
       columns.add(message, chunk);
       return true;
     };
-    good =
-        walk_records(chunk, error, add, [&](const Record& other) { return others.push_back(other), true; });
+    const auto add_other = [&](const Record& other) {
+      if (others.size() == kMaximumOthers)
+        return error.stop(RecordsReason::TooManyOthers, other.offset, kMaximumOthers);
+      others.push_back(other);
+      return true;
+    };
+    good = walk_records(chunk, error, add, add_other);
   }
   if (!good) fail(error);
   nb::list other_records;
@@ -176,6 +181,11 @@ nb::tuple index(nb::handle data) {
 // Memory as Python reads it: any number of views, none of which can change it.
 int view_memory(PyObject* self, Py_buffer* view, int flags) noexcept {
   static uint8_t nothing;
+  if (!nb::inst_ready(self)) {
+    PyErr_SetString(PyExc_BufferError, "only the native module makes memory");
+    view->obj = nullptr;
+    return -1;
+  }
   const Memory& memory = *nb::inst_ptr<Memory>(self);
   void* const data = memory.size() == 0 ? &nothing : const_cast<uint8_t*>(memory.data());
   return PyBuffer_FillInfo(view, self, data, static_cast<Py_ssize_t>(memory.size()), 1, flags);

@@ -13,6 +13,7 @@ namespace {
 
 constexpr char kMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
 constexpr size_t kHeaderBytes = 20, kMessageBytes = 24, kOperationBytes = 40;
+constexpr const char* kLargeMessage = "a message of this type is larger than 2 GiB";
 constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 
 // Sizes past what a message can have are all alike; stopping there keeps the arithmetic from overflowing.
@@ -183,8 +184,8 @@ const char* read_operation(const uint8_t* data, Operation& op) {
   op.name = words.name();
   op.protobuf_name = words.name();
   if (op.number > kMaximumFieldNumber) return "the plan has a field number out of range";
-  if (op.shape == Shape::Array && (op.count == 0 || op.count > kMaximumSize))
-    return "the plan has an array of no length";
+  if (op.shape == Shape::Array && op.count == 0) return "the plan has an array of no length";
+  if (op.shape == Shape::Array && op.count > kMaximumSize) return kLargeMessage;
   if (!derive_forms(op)) return "the plan has a field whose forms do not go together";
   derive_tag(op);
   return nullptr;
@@ -299,8 +300,7 @@ const char* Plan::derive(Message& message) {
     message.fixed = message.fixed && field.fixed;
   }
   const Advance& whole = message.default_size;
-  if (*std::max_element(whole.by, whole.by + 8) > kMaximumSize)
-    return "a message of this type is larger than 2 GiB";
+  if (*std::max_element(whole.by, whole.by + 8) > kMaximumSize) return kLargeMessage;
   if (uint64_t{message.count} + deepest > kUnbounded) return "the plan has too many operations";
   message.slots = message.count + deepest;
   return order(message);

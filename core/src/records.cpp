@@ -83,6 +83,8 @@ std::string reason(const RecordsError& error) {
       return "with this message the result would have more than " + a + " bytes; make smaller chunks";
     case RecordsReason::ChunkTooLarge:
       return "the chunk has " + a + " bytes and may have " + b + "; make smaller chunks";
+    case RecordsReason::TooManyOthers:
+      return "the chunk has more than " + a + " records that are no messages; it is damaged";
     case RecordsReason::OutOfMemory:
       return "there is not enough memory for the result; make smaller chunks";
   }

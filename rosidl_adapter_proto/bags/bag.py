@@ -6,12 +6,11 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.compression import read_chunk
 from rosidl_adapter_proto.bags.decoding import decoder
 from rosidl_adapter_proto.bags.message import BagMessage, MessageSource
 from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, Topic
@@ -19,12 +18,12 @@ from rosidl_adapter_proto.bags.order import Run, in_time_order
 from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.storage import StorageReader
+from rosidl_adapter_proto.bags.topic_names import no_such_topic
 from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.time import to_nanoseconds
-from rosidl_adapter_proto.transcode.error import RecordsError
-from rosidl_adapter_proto.transcode.records import Records, read_records
+from rosidl_adapter_proto.transcode.records import Records
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.time import Time
@@ -246,12 +245,7 @@ class Bag:
     def _file_runs(self, reader: StorageReader, selection: Selection, threads: int) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:
             self._check_open()
-            try:
-                return read_records(
-                    records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time
-                )
-            except RecordsError as error:
-                raise BagError(f"{chunk.where}: {error}") from error
+            return read_chunk(chunk, selection)
 
         chunks = reader.chunks(selection, in_time_order=True)
         if threads == 1:
@@ -323,13 +317,7 @@ class Bag:
         names = [topics] if isinstance(topics, str) else list(topics)
         for name in names:
             if name not in self.topics:
-                near = get_close_matches(name, self.topics, n=3)
-                known = (
-                    f"did you mean {' or '.join(near)}?"
-                    if near
-                    else f"there are {', '.join(self.topics) or 'none'}"
-                )
-                raise BagError(f"{self.path}: there is no topic {name}; {known}")
+                raise BagError(f"{self.path}: {no_such_topic(name, self.topics)}")
         return names
 
     def _check_open(self) -> None:
@@ -346,7 +334,7 @@ def open_bag(
     """Open a bag for reading.
 
     Args:
-        path: A folder of rosbag2, an `.mcap` or `.db3` file, or a ROS 1 `.bag`.
+        path: A folder of rosbag2, an `.mcap` or `.db3` file, or a ROS 1 `.bag`: a path, or a URL that fsspec knows.
         include: Folders of packages that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else; by default
             `$ROS_DISTRO`, else the newest.
@@ -356,6 +344,8 @@ def open_bag(
 
     Raises:
         BagError: There is no bag, or it cannot be read.
+        PlaceError: The place that a URL names cannot be reached.
+        RequestError: There is nothing installed that knows the URL.
     """
     bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in include], distro)
     bag.files  # noqa: B018  # what is wrong with a file is said here

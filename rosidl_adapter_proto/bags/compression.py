@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import threading
-import zlib
 from typing import TYPE_CHECKING
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32  # ten times as fast as that of zlib
 
-from rosidl_adapter_proto.bags.model import StoredChunk
+from rosidl_adapter_proto.bags.model import EVERYTHING, Selection, StoredChunk
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE
 from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.error import RecordsError
+from rosidl_adapter_proto.transcode.records import Records, read_records
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -50,9 +52,22 @@ def records_of(chunk: StoredChunk) -> Buffer:
     records = _DECOMPRESSORS[chunk.compression](chunk)
     if memoryview(records).nbytes != chunk.size:
         raise _damaged(chunk, f"it has {memoryview(records).nbytes} bytes and says {chunk.size}")
-    if chunk.crc and zlib.crc32(records) != chunk.crc:
-        raise _damaged(chunk, f"its checksum is {zlib.crc32(records):#010x} and should be {chunk.crc:#010x}")
+    if chunk.crc and crc32(records) != chunk.crc:
+        raise _damaged(chunk, f"its checksum is {crc32(records):#010x} and should be {chunk.crc:#010x}")
     return records
+
+
+def read_chunk(chunk: StoredChunk, selection: Selection = EVERYTHING) -> Records:
+    """Return those messages of a chunk that a selection has, and whatever else is in it.
+
+    Raises:
+        BagError: The chunk is damaged.
+    """
+    data = records_of(chunk)
+    try:
+        return read_records(data, selection.topic_ids, selection.start_time, selection.end_time)
+    except RecordsError as error:
+        raise BagError(f"{chunk.where}: {error}") from error
 
 
 def compress(data: Buffer, compression: str) -> Buffer:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any
@@ -16,9 +15,11 @@ from rosidl_adapter_proto.bags.metadata import METADATA_FILE, write_metadata
 from rosidl_adapter_proto.bags.model import Topic
 from rosidl_adapter_proto.bags.output import check_new, written_aside
 from rosidl_adapter_proto.bags.places import Place, file_size, find_place
-from rosidl_adapter_proto.bags.recorded_file import MCAP, ROSBAG, SQLITE3, SUFFIXES, ZSTD_SUFFIX
+from rosidl_adapter_proto.bags.recorded_file import ZSTD_SUFFIX
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
 from rosidl_adapter_proto.bags.routes import formats, selected_topics
+from rosidl_adapter_proto.bags.storage import MCAP, ROSBAG, SQLITE3, SUFFIXES, WRITTEN_SUFFIXES
+from rosidl_adapter_proto.bags.topic_names import is_named, no_such_topic
 from rosidl_adapter_proto.bags.workers import Workers
 from rosidl_adapter_proto.converters import Converter, ConverterRegistry
 from rosidl_adapter_proto.errors import RequestError
@@ -28,9 +29,6 @@ from rosidl_adapter_proto.time import to_nanoseconds
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.time import Time
-
-_WRITTEN = {MCAP: ".mcap", SQLITE3: ".db3"}
-"""The storages that are written, and how their files end."""
 
 
 def convert_bag(
@@ -200,8 +198,8 @@ def _form(recording: Recording, destination: Place, settings: Settings) -> tuple
     by_name = SUFFIXES.get(destination.suffix)
     storage = settings.storage or by_name or recording.storage
     storage = MCAP if storage == ROSBAG and storage != by_name else storage
-    if storage not in _WRITTEN:
-        raise RequestError(f"storage {storage!r} cannot be written; {' and '.join(_WRITTEN)} can")
+    if storage not in WRITTEN_SUFFIXES:
+        raise RequestError(f"storage {storage!r} cannot be written; {' and '.join(WRITTEN_SUFFIXES)} can")
     if by_name not in (None, storage):
         raise RequestError(f"{destination} ends as a file of {by_name}, and the storage is to be {storage}")
     if storage == SQLITE3 and settings.compression not in (None, "none"):
@@ -227,8 +225,8 @@ def _topics(recording: Recording) -> list[Topic]:
 def _check_names(patterns: Sequence[str], topics: Sequence[Topic]) -> None:
     names = sorted({topic.name for topic in topics})
     for pattern in patterns:
-        if not any(name == pattern or fnmatchcase(name, pattern) for name in names):
-            raise RequestError(f"no topic is called {pattern}; there are {', '.join(names) or 'none'}")
+        if not any(is_named(name, [pattern]) for name in names):
+            raise RequestError(no_such_topic(pattern, names))
 
 
 def _names(recording: Recording, storage: str) -> list[str]:
@@ -236,4 +234,4 @@ def _names(recording: Recording, storage: str) -> list[str]:
     stems = [Path(find_place(file.path).name.removesuffix(ZSTD_SUFFIX)).stem for file in recording.files]
     if len(set(stems)) < len(stems):
         stems = [f"{stem}_{index}" for index, stem in enumerate(stems)]
-    return [stem + _WRITTEN[storage] for stem in stems]
+    return [stem + WRITTEN_SUFFIXES[storage] for stem in stems]

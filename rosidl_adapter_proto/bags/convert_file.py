@@ -13,17 +13,16 @@ from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Sett
 from rosidl_adapter_proto.bags.description import WrittenFile, describe
 from rosidl_adapter_proto.bags.labels import label_warnings
 from rosidl_adapter_proto.bags.ledger import Ledger
-from rosidl_adapter_proto.bags.mcap_topics import ROS_DEFINITIONS, ROSBAG2
+from rosidl_adapter_proto.bags.mcap_topics import ROS_DEFINITIONS
 from rosidl_adapter_proto.bags.mcap_writer import McapWriter
-from rosidl_adapter_proto.bags.metadata import write_inner_metadata
+from rosidl_adapter_proto.bags.metadata import ROSBAG2, SERIALIZED_METADATA, write_inner_metadata
 from rosidl_adapter_proto.bags.model import CDR, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.places import Place, written_locally
-from rosidl_adapter_proto.bags.recorded_file import SQLITE3
 from rosidl_adapter_proto.bags.recording import Recording
 from rosidl_adapter_proto.bags.routes import MIXED_FORMATS, Fate, plan_routes, selected_topics
 from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
-from rosidl_adapter_proto.bags.storage import StorageReader, StorageWriter
+from rosidl_adapter_proto.bags.storage import SQLITE3, StorageReader, StorageWriter
 from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.converters import Converter
 from rosidl_adapter_proto.errors import BagError
@@ -263,7 +262,7 @@ class _FileConversion:
                 self._copy(partial(self._writer.add_metadata, name, values))
         file = WrittenFile(self._task.destination.name, self._topics, self._writer.statistics)
         metadata = describe(self._task.storage, [file], self._task.recording.metadata)
-        self._writer.add_metadata(ROSBAG2, {"serialized_metadata": write_inner_metadata(metadata)})
+        self._writer.add_metadata(ROSBAG2, {SERIALIZED_METADATA: write_inner_metadata(metadata)})
 
     def _copy(self, add: Callable[[], None]) -> None:
         """Add something that the storage may have no room for."""

@@ -60,6 +60,8 @@ def _pool(data: bytes) -> DescriptorPool:
     except DecodeError as error:
         raise BagError(f"its protobuf descriptor is damaged: {error}") from None
     by_name = {each.name: each for each in files}
+    if not all(isinstance(each, str) for each in by_name):  # protobuf gives bytes for what is no text
+        raise BagError("its protobuf descriptor has a file whose name is not UTF-8")
     if len(by_name) != len(files):
         raise BagError("its protobuf descriptor has two files of the same name")
     pool = DescriptorPool()

@@ -15,7 +15,7 @@ MISSING = "nowhere"
 
 
 @dataclass(frozen=True)
-class TopicInformation:
+class BagTopicInformation:
     """What there is of a topic.
 
     Attributes:
@@ -56,7 +56,7 @@ class BagInformation:
     start_time: int
     end_time: int
     message_count: int
-    topics: Sequence[TopicInformation]
+    topics: Sequence[BagTopicInformation]
     warnings: Sequence[str]
 
 
@@ -98,12 +98,12 @@ def _compression(bag: Bag, index: int) -> str:
     return f"{metadata.compression_format} (each message)" if metadata and metadata.compression_mode else ""
 
 
-def _topic_information(bag: Bag, topic: BagTopic, warnings: dict[str, None]) -> TopicInformation:
+def _topic_information(bag: Bag, topic: BagTopic, warnings: dict[str, None]) -> BagTopicInformation:
     try:
         types_from = bag.types.origin(topic)
     except BagError as error:
         types_from = MISSING
         warnings[str(error)] = None
-    return TopicInformation(
+    return BagTopicInformation(
         topic.name, topic.type_name, topic.serialization_format, topic.message_count, types_from
     )

@@ -6,12 +6,10 @@ from collections.abc import Iterable, Mapping
 from itertools import islice
 from typing import TYPE_CHECKING
 
-from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.compression import read_chunk
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, Selection, Topic
 from rosidl_adapter_proto.bags.storage import StorageReader
 from rosidl_adapter_proto.errors import BagError
-from rosidl_adapter_proto.transcode.error import RecordsError
-from rosidl_adapter_proto.transcode.records import read_records
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -70,17 +68,17 @@ def label_warnings(reader: StorageReader, topics: Mapping[int, Topic]) -> list[s
 
 def _first_messages(reader: StorageReader, topic_ids: Iterable[int]) -> dict[int, list[memoryview]]:
     """Return the first messages of those topics that are in the first chunk that has any; empty if none has."""
-    wanted = frozenset(topic_ids)
+    selection = Selection(frozenset(topic_ids))
     found: dict[int, list[memoryview]] = {}
     try:
-        for chunk in islice(reader.chunks(Selection(topic_ids=wanted)), _CHUNKS_LOOKED_AT):
-            records = read_records(records_of(chunk), topic_ids=wanted)
+        for chunk in islice(reader.chunks(selection), _CHUNKS_LOOKED_AT):
+            records = read_chunk(chunk, selection)
             for index, topic_id in enumerate(islice(records.topic_ids, _MESSAGES_LOOKED_THROUGH)):
                 messages = found.setdefault(topic_id, [])
                 if len(messages) < _LOOKED_AT:
                     messages.append(records[index])
             if found:
                 break
-    except (BagError, RecordsError):  # the file is damaged, which those say who read it as a whole
+    except BagError:  # the file is damaged, which those say who read it as a whole
         pass
     return found

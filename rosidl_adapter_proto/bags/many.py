@@ -12,12 +12,11 @@ from rosidl_adapter_proto.bags.conversion import ConversionResult, Progress, Set
 from rosidl_adapter_proto.bags.convert import convert_with, settings_of
 from rosidl_adapter_proto.bags.metadata import METADATA_FILE
 from rosidl_adapter_proto.bags.places import Place, RemotePath, find_place, is_pattern, matching_places
-from rosidl_adapter_proto.bags.recorded_file import MCAP, SQLITE3, SUFFIXES, ZSTD_SUFFIX
+from rosidl_adapter_proto.bags.recorded_file import ZSTD_SUFFIX
+from rosidl_adapter_proto.bags.storage import MCAP, SUFFIXES, WRITTEN_SUFFIXES
 from rosidl_adapter_proto.bags.workers import Workers
 from rosidl_adapter_proto.errors import BagError, Error, RequestError
 from rosidl_adapter_proto.generate.request import find_catalog
-
-_FILE_SUFFIXES = {storage: suffix for suffix, storage in SUFFIXES.items() if storage in (MCAP, SQLITE3)}
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ def _result_name(source: Place, storage: str | None) -> str:
     own = SUFFIXES.get(dot + suffix)
     if own is None:
         return name
-    return stem + _FILE_SUFFIXES.get(storage or own, _FILE_SUFFIXES[MCAP])
+    return stem + WRITTEN_SUFFIXES.get(storage or own, WRITTEN_SUFFIXES[MCAP])
 
 
 def convert_bags(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from mcap import records
 from mcap.opcode import Opcode
 
-from rosidl_adapter_proto.bags.compression import COMPRESSIONS, records_of
+from rosidl_adapter_proto.bags.compression import COMPRESSIONS, read_chunk
 from rosidl_adapter_proto.bags.mcap_records import (
     FOOTER_SIZE,
     KNOWN_OPCODES,
@@ -27,8 +27,6 @@ from rosidl_adapter_proto.bags.mcap_records import (
 )
 from rosidl_adapter_proto.bags.model import Statistics, StoredChunk
 from rosidl_adapter_proto.errors import BagError
-from rosidl_adapter_proto.transcode.error import RecordsError
-from rosidl_adapter_proto.transcode.records import read_records
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -170,12 +168,9 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
                 _add(contents, file, found)
                 continue
             chunk = file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
-            messages = read_records(records_of(chunk))
+            messages = read_chunk(chunk)
             for opcode, content in messages.others:
                 add_definition(contents, opcode, content, chunk.where)
-        except RecordsError as error:
-            damaged(BagError(f"{chunk.where}: the chunk is damaged: {error}"))
-            continue
         except BagError as error:
             damaged(error)
             continue

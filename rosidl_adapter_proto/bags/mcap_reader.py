@@ -23,6 +23,7 @@ from rosidl_adapter_proto.bags.mcap_contents import (
 from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, Place
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
+from rosidl_adapter_proto.bags.storage import MCAP
 from rosidl_adapter_proto.errors import BagError
 
 _SALVAGE = "`--on-error skip` reads"
@@ -49,7 +50,7 @@ class McapReader:
         BagError: The file is no MCAP file; or it is damaged, and not to be salvaged.
     """
 
-    storage = "mcap"
+    storage = MCAP
 
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path

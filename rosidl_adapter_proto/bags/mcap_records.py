@@ -7,12 +7,12 @@ Everything that can be wrong with a record ends here as a `BagError` with its pl
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
+from isal.isal_zlib import crc32
 from mcap import records
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.exceptions import EndOfFile, McapError
@@ -123,7 +123,7 @@ class McapFile:
         """Return the CRC-32 of the bytes from one place to another, both in the file."""
         crc = 0
         for piece in range(start, end, PIECE_SIZE):
-            crc = zlib.crc32(self.read(piece, min(piece + PIECE_SIZE, end)), crc)
+            crc = crc32(self.read(piece, min(piece + PIECE_SIZE, end)), crc)
         return crc
 
     def place(self, start: int, limit: int) -> Place:

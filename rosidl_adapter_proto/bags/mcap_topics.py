@@ -13,15 +13,15 @@ from dataclasses import replace
 
 from mcap.records import Channel, Metadata, Schema
 
-from rosidl_adapter_proto.bags.metadata import read_metadata
+from rosidl_adapter_proto.bags.metadata import ROSBAG2, SERIALIZED_METADATA, read_metadata
 from rosidl_adapter_proto.bags.model import CDR, ROS1, RecordedDefinition, Topic
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.schema.typemap import type_of_proto_name
 
 QOS_PROFILES = "offered_qos_profiles"
 TYPE_HASH = "topic_type_hash"
 ROS_TYPE = "ros_type"
-ROSBAG2 = "rosbag2"
 ROS_DEFINITIONS = "rosidl_adapter_proto.ros_definitions"
 """The metadata record with ROS's definitions: by the name of the type, its encoding, a newline, and the text.
 
@@ -31,7 +31,6 @@ the name of the type: `pkg/msg/Type 2`. Behind the encoding ` base64` says how a
 
 _BASE64 = " base64"
 
-_PROTOBUF_NAME = re.compile(r"(?P<package>\w+)\.(?P<kind>msg|srv|action)\.pb\.(?P<name>\w+)", re.ASCII)
 _ROS_NAME = re.compile(r"\w+/(msg|srv|action)/\w+", re.ASCII)
 
 
@@ -114,8 +113,8 @@ def _ros_name(serialization_format: str, schema_name: str) -> str:
         return schema_name
     if serialization_format == ROS1:
         return "/msg/".join(schema_name.split("/")) if schema_name.count("/") == 1 else schema_name
-    if match := _PROTOBUF_NAME.fullmatch(schema_name):
-        return f"{match['package']}/{match['kind']}/{match['name']}"
+    if found := type_of_proto_name(schema_name):
+        return str(found)
     return schema_name if _ROS_NAME.fullmatch(schema_name) else ""
 
 
@@ -155,7 +154,7 @@ def _ros_definitions(metadata: Iterable[Metadata], path: str) -> dict[str, Recor
 
 def _rosbag2_types(metadata: Iterable[Metadata], path: str) -> dict[str, str]:
     """Return the types by the names of the topics, as rosbag2's own description has them; the last one counts."""
-    texts = [record.metadata.get("serialized_metadata", "") for record in metadata if record.name == ROSBAG2]
+    texts = [record.metadata.get(SERIALIZED_METADATA, "") for record in metadata if record.name == ROSBAG2]
     if not texts:
         return {}
     description = read_metadata(texts[-1].encode(), f"{path}, the metadata in it")

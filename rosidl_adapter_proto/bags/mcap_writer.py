@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, BinaryIO
 
+from isal.isal_zlib import crc32
 from mcap import records
 from mcap.opcode import Opcode
 
@@ -21,6 +21,7 @@ from rosidl_adapter_proto.bags.mcap_topics import (
     write_schema,
 )
 from rosidl_adapter_proto.bags.model import Attachment, RecordedDefinition, Statistics, Topic
+from rosidl_adapter_proto.bags.storage import MCAP
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import RecordIndex, index_records
 
@@ -72,7 +73,7 @@ class McapWriter:
         BagError: There is no such compression.
     """
 
-    storage = "mcap"
+    storage = MCAP
 
     def __init__(self, file: BinaryIO, path: str, *, profile: str, compression: str = "") -> None:
         if compression not in COMPRESSIONS:
@@ -121,7 +122,7 @@ class McapWriter:
         return PackedMcapChunk(
             compress(records, self.compression),
             memoryview(records).nbytes,
-            zlib.crc32(records),
+            crc32(records),
             index_records(records),
         )
 
@@ -217,7 +218,7 @@ class McapWriter:
         footer = write(records.Footer(summary_start, offset_start, 0))[:-4]
         summary += offsets + footer
         self._write(summary)
-        self._write(zlib.crc32(summary).to_bytes(4, "little"))
+        self._write(crc32(summary).to_bytes(4, "little"))
         self._write(MAGIC)
         self._file.close()
 

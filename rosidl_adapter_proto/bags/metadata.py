@@ -19,6 +19,10 @@ NEWEST_VERSION = 9
 WRITTEN_VERSION = 8
 """What is written: version 9 has nothing that 8 has not, and rosbag2 of Humble and Iron cannot read it."""
 
+ROSBAG2 = "rosbag2"
+SERIALIZED_METADATA = "serialized_metadata"
+"""What a storage calls the metadata that rosbag2 keeps inside it, and the one value of that."""
+
 MAXIMUM_SIZE = 16 * 2**20
 """The largest metadata.yaml that is read, in bytes."""
 

@@ -211,8 +211,10 @@ def _told(place: RemotePath, missing: str = "no such file or folder") -> Iterato
         raise
     except FileNotFoundError:
         raise BagError(f"{place}: {missing}") from None
-    except PermissionError as error:
-        raise BagError(f"{place}: {error or 'no permission'}") from error
+    except NotImplementedError:
+        raise BagError(f"{place}: nothing can be written there; choose another place") from None
+    except (PermissionError, ValueError) as error:  # the latter where a server sends no parts of files
+        raise BagError(f"{place}: {error}") from error
     except Exception as error:
         raise PlaceError(f"{place}: {type(error).__name__}: {error}") from error
 

@@ -16,27 +16,21 @@ from typing import BinaryIO
 
 import zstandard
 
-from rosidl_adapter_proto.bags.compression import records_of
+from rosidl_adapter_proto.bags.compression import ZSTD, read_chunk
 from rosidl_adapter_proto.bags.mcap_reader import McapReader
-from rosidl_adapter_proto.bags.mcap_writer import McapWriter
-from rosidl_adapter_proto.bags.metadata import METADATA_FILE, BagMetadata, read_metadata
+from rosidl_adapter_proto.bags.mcap_records import MAGIC
+from rosidl_adapter_proto.bags.metadata import METADATA_FILE, SERIALIZED_METADATA, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.places import RemotePath, find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
 from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteReader
-from rosidl_adapter_proto.bags.sqlite3_writer import SqliteWriter
-from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, StorageReader, StorageWriter
+from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, MCAP, ROSBAG, SQLITE3, StorageReader
 from rosidl_adapter_proto.errors import BagError
-from rosidl_adapter_proto.transcode.error import RecordsError
-from rosidl_adapter_proto.transcode.records import Records, pack_records, read_records
+from rosidl_adapter_proto.transcode.records import Records, pack_records
 
-MCAP = "mcap"
-SQLITE3 = "sqlite3"
-ROSBAG = "rosbag_v2"
-SUFFIXES: Mapping[str, str] = {".mcap": MCAP, ".db3": SQLITE3, ".bag": ROSBAG}
 ZSTD_SUFFIX = ".zstd"
 
-_MAGICS = {b"\x89MCAP0\r\n": MCAP, b"SQLite format 3\0": SQLITE3, b"#ROSBAG V": ROSBAG}
+_MAGICS = {MAGIC: MCAP, b"SQLite format 3\0": SQLITE3, b"#ROSBAG V": ROSBAG}
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _SPARE_SPACE = 2**26  # bytes that stay free on the disk of temporary files
 _PIECE_SIZE = 2**20  # bytes of decompressed messages in a chunk, about
@@ -126,35 +120,6 @@ def open_reader(file: RecordedFile, metadata: BagMetadata | None, salvage: bool 
         return _OpenedFile(reader, metadata, stack, salvage, damage)
 
 
-def create_file(
-    path: str, storage: str, *, profile: str = "", compression: str = "", ros_distro: str = ""
-) -> StorageWriter:
-    """Create a file of a recording.
-
-    Args:
-        path: The file, which must not exist.
-        storage: The name of its storage in rosbag2: `mcap` or `sqlite3`.
-        profile: The profile of an MCAP file.
-        compression: What the chunks of an MCAP file are compressed with: `zstd`, `lz4`, or empty for nothing.
-        ros_distro: The ROS distribution that recorded the messages, which sqlite3 keeps.
-
-    Raises:
-        BagError: It exists, cannot be created, or the storage cannot do what is asked for.
-    """
-    if storage == MCAP:
-        try:
-            return McapWriter(open(path, "xb"), path, profile=profile, compression=compression)
-        except FileExistsError:
-            raise BagError(f"{path}: exists already") from None
-        except OSError as error:
-            raise BagError(f"{path}: {error.strerror}") from None
-    if storage != SQLITE3:
-        raise BagError(f"{path}: the storage {storage!r} cannot be written; use {MCAP} or {SQLITE3}")
-    if compression:
-        raise BagError(f"{path}: sqlite3 has no compression; write MCAP, or leave {compression} out")
-    return SqliteWriter(path, ros_distro=ros_distro)
-
-
 def _decompressed(path: str, stack: ExitStack) -> tuple[str, BagError | None]:
     """Return a temporary file with what another has compressed, and why that is not all of it."""
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-"))
@@ -236,7 +201,7 @@ class _OpenedFile:
         self._damages = {} if damage is None else {str(damage): None}
         metadata = metadata or self._inner_metadata(reader)
         self._messages_compressed = metadata is not None and metadata.compression_mode == "MESSAGE"
-        if metadata is not None and self._messages_compressed and metadata.compression_format != "zstd":
+        if metadata is not None and self._messages_compressed and metadata.compression_format != ZSTD:
             known = f"compressed with {metadata.compression_format!r}; only zstd is known"
             raise BagError(f"{self.path}: its messages are {known}")
         self._reader = reader
@@ -274,10 +239,8 @@ class _OpenedFile:
     ) -> Iterator[StoredChunk]:
         """Yield the messages of a chunk, each of which is compressed, in chunks of a bounded size."""
         try:
-            records = read_records(
-                records_of(chunk), selection.topic_ids, selection.start_time, selection.end_time
-            )
-        except (BagError, RecordsError):
+            records = read_chunk(chunk, selection)
+        except BagError:
             yield chunk  # it is damaged, which those who look into it will find as well
             return
         size = 0
@@ -308,7 +271,7 @@ class _OpenedFile:
     def _inner_metadata(self, reader: StorageReader) -> BagMetadata | None:
         """Return what rosbag2 wrote into a file about its bag; the last one counts."""
         texts = [
-            values["serialized_metadata"] for _, values in reader.metadata if "serialized_metadata" in values
+            values[SERIALIZED_METADATA] for _, values in reader.metadata if SERIALIZED_METADATA in values
         ]
         if not texts:
             return None

@@ -13,14 +13,13 @@ from pathlib import Path
 from rosidl_adapter_proto.bags.metadata import MAXIMUM_SIZE, METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.places import Place, file_size, find_place
 from rosidl_adapter_proto.bags.recorded_file import (
-    SUFFIXES,
     ZSTD_SUFFIX,
     RecordedFile,
     open_file,
     open_reader,
     recognize,
 )
-from rosidl_adapter_proto.bags.storage import StorageReader
+from rosidl_adapter_proto.bags.storage import SUFFIXES, StorageReader
 from rosidl_adapter_proto.errors import BagError
 
 

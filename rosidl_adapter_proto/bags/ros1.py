@@ -26,6 +26,7 @@ from rosidl_adapter_proto.bags.model import (
     Topic,
 )
 from rosidl_adapter_proto.bags.ros1_records import Operation, Record, Source, read_fields
+from rosidl_adapter_proto.bags.storage import ROSBAG
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
 
@@ -120,7 +121,7 @@ class Ros1Reader:
         BagError: It is no ROS 1 bag of version 2.0, or is encrypted or damaged.
     """
 
-    storage = "rosbag_v2"
+    storage = ROSBAG
 
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from fnmatch import fnmatchcase
 
 from rosidl_adapter_proto.bags.conversion import DEFAULT_FORMATS, OnError, Settings
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Statistics, Topic
+from rosidl_adapter_proto.bags.topic_names import is_named
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition
 from rosidl_adapter_proto.converters.ros1 import check_ros2_type
 from rosidl_adapter_proto.errors import BagError, ConverterError
@@ -64,13 +64,9 @@ def selected_topics(topics: Mapping[int, Topic], settings: Settings) -> dict[int
     return {
         topic_id: replace(topic, serialization_format=settings.source_format or topic.serialization_format)
         for topic_id, topic in topics.items()
-        if (not settings.topics or _matches(topic.name, settings.topics))
-        and not _matches(topic.name, settings.excluded_topics)
+        if (not settings.topics or is_named(topic.name, settings.topics))
+        and not is_named(topic.name, settings.excluded_topics)
     }
-
-
-def _matches(name: str, patterns: Sequence[str]) -> bool:
-    return any(name == pattern or fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def formats(topics: Sequence[Topic], settings: Settings) -> tuple[str, str]:

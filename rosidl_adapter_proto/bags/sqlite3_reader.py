@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 from urllib.parse import quote
 
+from rosidl_adapter_proto.bags.metadata import ROSBAG2, SERIALIZED_METADATA
 from rosidl_adapter_proto.bags.model import (
     EVERYTHING,
     PROTOBUF,
@@ -30,6 +31,7 @@ from rosidl_adapter_proto.bags.model import (
     Topic,
 )
 from rosidl_adapter_proto.bags.qos import numbered_qos
+from rosidl_adapter_proto.bags.storage import SQLITE3
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
 
@@ -60,7 +62,7 @@ class SqliteReader:
         BagError: It is no sqlite3 database, or none of rosbag2.
     """
 
-    storage = "sqlite3"
+    storage = SQLITE3
 
     def __init__(self, file_path: str, path: str = "", *, salvage: bool = False) -> None:
         self.path = path = path or file_path
@@ -254,7 +256,7 @@ class SqliteReader:
 
     def _read_metadata(self) -> list[tuple[str, Mapping[str, str]]]:
         """Return what rosbag2 wrote about the bag, the newest last, by the names that it has for that in MCAP."""
-        return [("rosbag2", {"serialized_metadata": text}) for _, text in self._texts("metadata", "metadata")]
+        return [(ROSBAG2, {SERIALIZED_METADATA: text}) for _, text in self._texts("metadata", "metadata")]
 
     def _selecting(self, selection: Selection, in_time_order: bool) -> tuple[str, list[int]]:
         """Return the query for the messages of a selection, and its values after the first, which is a row to begin at.

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rosidl_adapter_proto.bags.metadata import WRITTEN_VERSION
+from rosidl_adapter_proto.bags.metadata import ROSBAG2, SERIALIZED_METADATA, WRITTEN_VERSION
 from rosidl_adapter_proto.bags.model import PROTOBUF, Attachment, RecordedDefinition, Statistics, Topic
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.bags.sqlite3_reader import definition_names
-from rosidl_adapter_proto.bags.storage import PackedChunk
+from rosidl_adapter_proto.bags.storage import SQLITE3, PackedChunk
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import Records, read_records
 
@@ -67,7 +67,7 @@ class SqliteWriter:
         BagError: The file exists, or cannot be created.
     """
 
-    storage = "sqlite3"
+    storage = SQLITE3
 
     def __init__(self, path: str, *, ros_distro: str = "") -> None:
         self.path = path
@@ -158,10 +158,10 @@ class SqliteWriter:
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write what rosbag2 says of the bag; for anything else there is no room, which is a BagError."""
-        if name != "rosbag2" or values.keys() != {"serialized_metadata"}:
+        if name != ROSBAG2 or values.keys() != {SERIALIZED_METADATA}:
             raise BagError(f"{self.path}: sqlite3 has no room for the metadata {name}; write MCAP instead")
         insertion = "INSERT INTO metadata (metadata_version, metadata) VALUES (?, ?)"
-        self._execute(insertion, WRITTEN_VERSION, values["serialized_metadata"])
+        self._execute(insertion, WRITTEN_VERSION, values[SERIALIZED_METADATA])
 
     def finish(self) -> None:
         """Index the messages by time, and close the file."""

@@ -10,6 +10,17 @@ from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, S
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
+MCAP = "mcap"
+SQLITE3 = "sqlite3"
+ROSBAG = "rosbag_v2"
+"""The storages that are read, by their names in rosbag2; the last is ROS 1."""
+
+SUFFIXES: Mapping[str, str] = {".mcap": MCAP, ".db3": SQLITE3, ".bag": ROSBAG}
+"""The storages by what the names of their files end with."""
+
+WRITTEN_SUFFIXES: Mapping[str, str] = {MCAP: ".mcap", SQLITE3: ".db3"}
+"""What the names of files end with, by the storages that are written."""
+
 MAXIMUM_CHUNK_SIZE = 2**32 - 1
 """The largest chunk that is read, in bytes: what a file says is not believed before memory is taken for it."""
 

@@ -7,7 +7,6 @@ folders that the user names, what is installed, and the embedded store.
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Hashable, Iterable
 from dataclasses import replace
 from functools import cached_property
@@ -32,9 +31,9 @@ from rosidl_adapter_proto.interfaces.recorded import (
 )
 from rosidl_adapter_proto.schema.pools import MessageClass
 from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
+from rosidl_adapter_proto.schema.typemap import type_of_proto_name
 from rosidl_adapter_proto.transcode.codec import Transcoder
 
-_PROTO_NAME = re.compile(r"(\w+)\.(msg|srv|action)\.pb\.(\w+)")
 _KNOWN_HASH = "RIHS01_"
 _NEVER_CHANGED = {TypeName("builtin_interfaces", "msg", name) for name in ("Time", "Duration")}
 _ADVICE = "give the folder of its package with --include FOLDER, or the distribution it is from with --distro"
@@ -230,7 +229,7 @@ class BagTypes:
 
 def protobuf_definition(schema: Schema) -> RecordedDefinition:
     """Return the descriptor of a message as recordings have it: its file and all that it imports."""
-    return RecordedDefinition("protobuf", descriptor_set(schema.descriptor))
+    return RecordedDefinition(PROTOBUF, descriptor_set(schema.descriptor))
 
 
 def ros_definition(schema: Schema) -> RecordedDefinition:
@@ -289,18 +288,18 @@ def _ros_type(topic: Topic) -> TypeName:
     """
     if topic.serialization_format != PROTOBUF or "/" in topic.type_name:
         return recorded_type_name(topic.type_name)
-    match = _PROTO_NAME.fullmatch(topic.schema_name)
-    if match is None:
+    name = type_of_proto_name(topic.schema_name)
+    if name is None:
         raise BagError(
             "its messages are protobuf messages of no ROS type: they can be read, but not converted"
         )
-    return TypeName(*match.groups())
+    return name
 
 
 def _is_ros_type(topic: Topic) -> bool:
     """Tell whether a topic has a ROS type, as all of those have that ROS itself has serialized."""
     is_ros = "/" in topic.type_name or topic.serialization_format in (CDR, ROS1)
-    return is_ros or _PROTO_NAME.fullmatch(topic.schema_name) is not None
+    return is_ros or type_of_proto_name(topic.schema_name) is not None
 
 
 def _recorded_class(topic: Topic) -> MessageClass:

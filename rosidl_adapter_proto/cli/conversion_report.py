@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rosidl_adapter_proto.cli.texts import show_warnings, size_text, time_text
+
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.conversion import ConversionResult, Progress
     from rosidl_adapter_proto.bags.many import BagOutcome, BagsProgress
 
 _REDRAWN_AFTER = 0.1  # seconds
-_UNITS = ("B", "kB", "MB", "GB", "TB")
 
 
 class ProgressLine:
@@ -52,8 +53,7 @@ class ProgressLine:
 
 def show_result(destination: str, result: ConversionResult, seconds: float | None = None) -> None:
     """Print what became of a bag, and what is odd about it."""
-    for warning in result.warnings:
-        click.echo(f"Warning: {warning}", err=True)
+    show_warnings(result.warnings)
     _show_failures(result)
     click.echo(_summary(result, destination, seconds))
 
@@ -81,7 +81,8 @@ def show_outcomes(outcomes: Sequence[BagOutcome], seconds: float) -> None:
     }
     size = sum(result.source_size for result in results)
     texts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-    click.echo(f"{len(outcomes)} bags: {texts}; in {time_text(seconds)} ({size_text(size / seconds)}/s)")
+    bags = "1 bag" if len(outcomes) == 1 else f"{len(outcomes)} bags"
+    click.echo(f"{bags}: {texts}; in {time_text(seconds)} ({size_text(size / seconds)}/s)")
     for outcome in failed:
         where = "" if outcome.source in outcome.error else f"{outcome.source}: "
         click.echo(f"Failed: {where}{outcome.error}", err=True)
@@ -104,22 +105,3 @@ def _summary(result: ConversionResult, destination: str, seconds: float | None) 
         "" if seconds is None else f", in {time_text(seconds)} ({size_text(result.source_size / seconds)}/s)"
     )
     return f"{destination}: {counts or '0 converted'}; {sizes}{rate}"
-
-
-def size_text(size: float) -> str:
-    """Return a number of bytes as people read it."""
-    unit = 0
-    while size >= 1000 and unit < len(_UNITS) - 1:
-        size /= 1000
-        unit += 1
-    digits = 0 if unit == 0 or size >= 99.95 else 1
-    return f"{size:.{digits}f} {_UNITS[unit]}"
-
-
-def time_text(seconds: float) -> str:
-    """Return a duration as people read it."""
-    if seconds < 59.95:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -114,6 +114,16 @@ def time_options(command: Command) -> Command:
     return start(end(command))
 
 
+def _names(context: click.Context, parameter: click.Parameter, text: str | None) -> list[str] | None:
+    return None if text is None else [name.strip() for name in text.split(",")]
+
+
+def fields_option(command: Command) -> Command:
+    """Add the option that chooses fields of messages; they reach the command as a list of names, or None."""
+    help_text = "Only these fields of the messages."
+    return click.option("--fields", metavar="A.B,C", callback=_names, help=help_text)(command)
+
+
 def plugin_option(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the option that names converter plugins; they reach the command with all others as `registry`."""
 

@@ -5,7 +5,9 @@ It is that of rosidl_typesupport_protobuf: types, names and therefore bytes on t
 
 from __future__ import annotations
 
-from rosidl_adapter_proto.interfaces.model import FieldType, Shape, TypeName, type_parts
+import re
+
+from rosidl_adapter_proto.interfaces.model import NAMESPACES, FieldType, Shape, TypeName, type_parts
 from rosidl_adapter_proto.interfaces.scalars import SCALARS
 
 MSG_TYPE_TO_PROTO = {name: row.protobuf for name, row in SCALARS.items()}
@@ -16,6 +18,8 @@ DEFAULT_PYTHON_ROOT = "rosidl_proto"
 
 PROTO_PACKAGE_POSTFIX = "pb"
 """The last part of each protobuf package name."""
+
+_PROTO_FULL_NAME = re.compile(rf"(\w+)\.({'|'.join(NAMESPACES)})\.{PROTO_PACKAGE_POSTFIX}\.(\w+)", re.ASCII)
 
 PROTO_SERVICE_CALL_NAME = "Call"
 """The rpc of a ROS service."""
@@ -38,6 +42,12 @@ def proto_package(name: TypeName) -> str:
 def proto_full_name(name: TypeName) -> str:
     """Return the full protobuf name of a type: `std_msgs.msg.pb.String`."""
     return f"{proto_package(name)}.{name.name}"
+
+
+def type_of_proto_name(full_name: str) -> TypeName | None:
+    """Return the type whose `proto_full_name` it is; None if it is that of no type."""
+    match = _PROTO_FULL_NAME.fullmatch(full_name)
+    return TypeName(*match.groups()) if match else None
 
 
 def proto_path(name: TypeName) -> str:

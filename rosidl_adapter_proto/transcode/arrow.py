@@ -12,7 +12,7 @@ from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.interfaces.scalars import CdrForm
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.transcode import _core
-from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE
+from rosidl_adapter_proto.transcode.codec import MAXIMUM_SIZE, plan_errors
 from rosidl_adapter_proto.transcode.columns import (
     DURATION,
     SERIALIZATIONS,
@@ -80,7 +80,7 @@ class ColumnReader:
             a column would have more than 2 GiB.
 
     Raises:
-        SchemaError: The type has no such field, or becomes too many columns.
+        SchemaError: The type has no such field, becomes too many columns, or its messages are too large.
         RequestError: The serialization format is another one.
         ValueError: `maximum_rows` or `maximum_bytes` is not positive.
     """
@@ -105,7 +105,8 @@ class ColumnReader:
         self._columns = columns_of(plan)
         self._maximum_rows = maximum_rows
         self._maximum_bytes = maximum_bytes
-        transcoder = _core.Transcoder(plan.pack(), plan.type_name, MAXIMUM_SIZE)
+        with plan_errors(plan):
+            transcoder = _core.Transcoder(plan.pack(), plan.type_name, MAXIMUM_SIZE)
         layout, serialization = pack_layout(self._columns), SERIALIZATIONS.index(serialization_format)
         self._filler = _core.ColumnFiller(transcoder, layout, serialization)
         self.arrow_schema = pa.schema(_fields(self._columns))

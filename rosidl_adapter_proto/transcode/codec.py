@@ -5,6 +5,7 @@ The work is done by methods of the native module, which `_core.pyi` describes; t
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,7 +18,7 @@ from rosidl_adapter_proto.errors import ConversionError, SchemaError, wrong_mess
 from rosidl_adapter_proto.interfaces.description import TypeDescription
 from rosidl_adapter_proto.transcode import _core
 from rosidl_adapter_proto.transcode.error import TranscodeError
-from rosidl_adapter_proto.transcode.plan import build_plan
+from rosidl_adapter_proto.transcode.plan import Plan, build_plan
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -67,6 +68,15 @@ class Batch:
         return f"<Batch of {len(self)} messages, {len(self.errors)} failed>"
 
 
+@contextlib.contextmanager
+def plan_errors(plan: Plan) -> Iterator[None]:
+    """Raise a SchemaError for what the core says of a plan, such as that an array makes each message too large."""
+    try:
+        yield
+    except ValueError as error:
+        raise SchemaError(f"{plan.type_name}: {error}") from None
+
+
 class Transcoder(_core.Transcoder):
     """Transcodes the messages of one type, from bytes to bytes.
 
@@ -110,10 +120,8 @@ class Transcoder(_core.Transcoder):
         plan = build_plan(
             type_description, descriptor, omit_empty_messages=omit_empty_messages, fields=fields
         )
-        try:
+        with plan_errors(plan):
             super().__init__(plan.pack(), plan.type_name, size_limit)
-        except ValueError as error:  # such as an array that makes each message too large
-            raise SchemaError(f"{plan.type_name}: {error}") from None
 
     def cdr_to_proto_batch(
         self,

@@ -269,7 +269,7 @@ def test_selection(options: dict[str, Any], chosen: list[Recorded] | None) -> No
     if chosen is None:
         from rosidl_adapter_proto.errors import RequestError
 
-        with pytest.raises(RequestError, match=r"^no topic is called /nothing\*; there are /a, /b$"):
+        with pytest.raises(RequestError, match=r"^there is no topic /nothing\*; there are /a, /b$"):
             convert_bag(source, "out.mcap", **options)
         return
     result = convert_bag(source, "out.mcap", **options)

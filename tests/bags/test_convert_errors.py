@@ -415,7 +415,7 @@ def test_no_converter() -> None:
             "files of sqlite3 are not compressed; leave --compression out, or write mcap",
         ),
         ("out.bag", {}, "storage 'rosbag_v2' cannot be written; mcap and sqlite3 can"),
-        ("out", {"topics": ["/a", "a"]}, "no topic is called a; there are /a"),
+        ("out", {"topics": ["/a", "a"]}, "there is no topic a; did you mean /a?"),
     ],
 )
 def test_what_does_not_fit(destination: str, options: dict[str, Any], text: str) -> None:

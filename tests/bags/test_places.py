@@ -224,6 +224,30 @@ def test_what_is_not_there(url: str, kind: type[Error], message: str) -> None:
     assert str(error.value) == message
 
 
+@pytest.mark.parametrize(
+    ("raised", "kind", "message"),
+    [
+        (FileNotFoundError("a"), BagError, "no such file or folder"),
+        (PermissionError("Forbidden"), BagError, "Forbidden"),
+        (ValueError("no range requests"), BagError, "no range requests"),
+        (NotImplementedError(), BagError, "nothing can be written there; choose another place"),
+        (OSError("reset"), PlaceError, "OSError: reset"),
+        (TimeoutError(), PlaceError, "TimeoutError: "),
+        (BagError("known"), BagError, None),
+    ],
+)
+def test_errors_of_file_systems(
+    memory: Any, monkeypatch: pytest.MonkeyPatch, raised: Exception, kind: type[Error], message: str | None
+) -> None:
+    def failing(*arguments: Any, **options: Any) -> Any:
+        raise raised
+
+    monkeypatch.setattr(type(memory), "isfile", failing)
+    with pytest.raises(kind) as error:
+        open_bag("memory://a")
+    assert str(error.value) == ("known" if message is None else f"memory://a: {message}")
+
+
 def test_the_package_of_the_file_system_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(url: str) -> None:
         raise ImportError("Install s3fs to access S3")
@@ -314,7 +338,7 @@ class Server(BaseHTTPRequestHandler):
 def server() -> Iterator[str]:
     """Yield the URL of a web server for the current folder."""
     with ThreadingHTTPServer(("127.0.0.1", 0), Server) as running:
-        thread = threading.Thread(target=running.serve_forever)
+        thread = threading.Thread(target=running.serve_forever, args=(0.01,))
         thread.start()
         Server.ranges.clear()
         yield f"http://127.0.0.1:{running.server_port}"

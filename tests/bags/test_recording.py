@@ -20,7 +20,6 @@ from rosidl_adapter_proto.bags.metadata import (
     write_metadata,
 )
 from rosidl_adapter_proto.bags.model import Selection, Topic
-from rosidl_adapter_proto.bags.recorded_file import create_file
 from rosidl_adapter_proto.bags.recording import find_recording
 from rosidl_adapter_proto.errors import BagError
 from tests.bags.databases import NAMED_QOS, QOS, ROWS, STRING_HASH, Row, database, rows_of
@@ -419,27 +418,3 @@ def test_a_full_disk_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(BagError) as caught:
         _read(path)
     assert str(caught.value) == f"{path}: cannot be opened: [Errno 28] No space left on device"
-
-
-def test_files_are_created_by_the_name_of_their_storage(tmp_path: Path) -> None:
-    for storage, name in (("mcap", "a.mcap"), ("sqlite3", "a.db3")):
-        with create_file(str(tmp_path / name), storage) as writer:
-            assert (writer.storage, writer.path) == (storage, str(tmp_path / name))
-            writer.finish()
-        assert find_recording(str(tmp_path / name)).storage == storage
-    for name, storage, options, expected in (
-        ("a.mcap", "mcap", {}, "exists already"),
-        ("a.db3", "sqlite3", {}, "exists already"),
-        ("no/a.mcap", "mcap", {}, "No such file or directory"),
-        ("b.bag", "rosbag_v2", {}, "the storage 'rosbag_v2' cannot be written; use mcap or sqlite3"),
-        (
-            "b.db3",
-            "sqlite3",
-            {"compression": "zstd"},
-            "sqlite3 has no compression; write MCAP, or leave zstd out",
-        ),
-    ):
-        with pytest.raises(BagError) as caught:
-            create_file(str(tmp_path / name), storage, **options)
-        assert str(caught.value) == f"{tmp_path / name}: {expected}"
-    assert not (tmp_path / "b.db3").exists()

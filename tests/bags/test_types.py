@@ -14,6 +14,7 @@ from rosidl_adapter_proto import TypeRegistry
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition, ros_definition
 from rosidl_adapter_proto.errors import BagError, RequestError, SchemaError
+from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import folder_source, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
@@ -402,6 +403,7 @@ def changed(file: FileDescriptorProto, **values: Any) -> FileDescriptorProto:
     [
         (cloud(b"\xff"), "its protobuf descriptor is damaged: .*"),
         (cloud(VECTOR, VECTOR), "its protobuf descriptor has two files of the same name"),
+        (cloud(b"\n\3\n\1\x80"), "its protobuf descriptor has a file whose name is not UTF-8"),
         (
             cloud(CLOUD),
             "its protobuf descriptor has no file 'foxglove/Vector.proto', which 'foxglove/PointCloud.proto' imports",
@@ -451,17 +453,26 @@ def test_topics_that_are_not_of_ros_are_not_generated() -> None:
     assert types(*recorded).recorded_types().types == (TypeName("my_msgs", "msg", "Track"),)
 
 
+@pytest.fixture
+def elsewhere() -> Catalog:
+    return find_catalog((), None)
+
+
+@pytest.fixture
+def whole(elsewhere: Catalog) -> Topic:
+    return in_protobuf(topic(TRACK + HEADER), types(elsewhere=elsewhere))
+
+
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_garbage(data: st.DataObject) -> None:
-    whole = in_protobuf(topic(TRACK + HEADER), types())
+def test_garbage(elsewhere: Catalog, whole: Topic, data: st.DataObject) -> None:
     content = bytearray(whole.definition.data)
     for _ in range(data.draw(st.integers(1, 3))):
         at = data.draw(st.integers(0, len(content)))
         content[at : at + data.draw(st.integers(0, 4))] = data.draw(st.binary(max_size=4))
     damaged = Topic(**{**vars(whole), "definition": RecordedDefinition(PROTOBUF, bytes(content))})
     try:
-        schema = types(damaged).schema(damaged)
+        schema = types(damaged, elsewhere=elsewhere).schema(damaged)
         Transcoder(schema.type_description, schema.descriptor)
     except (BagError, SchemaError):
         pass

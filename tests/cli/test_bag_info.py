@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import bag_maker
 from benchmarks.bag_maker import IMU, JOINT_STATES, TF, record
-from rosidl_adapter_proto.cli.commands.bag.info import _size
+from rosidl_adapter_proto.cli.texts import size_text
 from tests.cli.conftest import Run
 
 
@@ -28,7 +28,7 @@ def test_info(bag: Path, run: Run) -> None:
     assert ended.out == f"""\
 files:     bag.mcap
 storage:   mcap, zstd
-size:      {_size(bag.stat().st_size)}
+size:      {size_text(bag.stat().st_size)}
 messages:  500
 duration:  1.995000000 s
 start:     2023-11-14T22:13:20.000000000Z (1700000000000000000)
@@ -150,18 +150,3 @@ def test_no_bag(run: Run) -> None:
     ended = run("bag", "info", "no.mcap")
 
     assert (ended.code, ended.out, ended.err) == (3, "", "Error: no.mcap: no such file or folder\n")
-
-
-@pytest.mark.parametrize(
-    ("size", "printed"),
-    [
-        (0, "0 B"),
-        (999, "999 B"),
-        (1000, "1 kB"),
-        (12_345_678, "12.3 MB"),
-        (10**14, "100 TB"),
-        (10**18, "1e+03 PB"),
-    ],
-)
-def test_sizes(size: int, printed: str) -> None:
-    assert _size(size) == printed

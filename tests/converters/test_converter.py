@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rosidl_adapter_proto import TypeRegistry
@@ -261,14 +261,20 @@ def test_many_threads(schema: Schema) -> None:
 GARBAGE = st.binary(max_size=40)
 
 
-@pytest.mark.parametrize(
-    "formats",
-    [("cdr", "protobuf"), ("protobuf", "cdr"), ("ros1", "cdr"), ("json", "cdr"), ("protobuf", "json")],
+@pytest.fixture(
+    params=[("cdr", "protobuf"), ("protobuf", "cdr"), ("ros1", "cdr"), ("json", "cdr"), ("protobuf", "json")],
+    ids="-".join,
 )
-@given(data=GARBAGE | GARBAGE.map(HEADER.__add__) | GARBAGE.map(b"\n".__add__))
-def test_garbage(formats: tuple[str, str], data: bytes, schema: Schema) -> None:
-    """Whatever the bytes are, only our errors come out."""
+def converter(request: pytest.FixtureRequest) -> Converter:
     registry = ConverterRegistry()
     registry.register("json_converter", JsonConverter)
-    [converted] = Converter(*formats, registry).convert_batch([SerializedBagMessage(data)], schema)
+    input_format, output_format = request.param
+    return Converter(input_format, output_format, registry)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=GARBAGE | GARBAGE.map(HEADER.__add__) | GARBAGE.map(b"\n".__add__))
+def test_garbage(converter: Converter, data: bytes, schema: Schema) -> None:
+    """Whatever the bytes are, only our errors come out."""
+    [converted] = converter.convert_batch([SerializedBagMessage(data)], schema)
     assert isinstance(converted, (SerializedBagMessage, ConversionError))

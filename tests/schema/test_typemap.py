@@ -22,6 +22,7 @@ from rosidl_adapter_proto.schema.typemap import (
     proto_package,
     proto_path,
     proto_type,
+    type_of_proto_name,
 )
 
 IMU = TypeName("sensor_msgs", "msg", "Imu")
@@ -66,6 +67,14 @@ def test_every_type_is_mapped() -> None:
 def test_names() -> None:
     assert proto_package(IMU) == "sensor_msgs.msg.pb"
     assert proto_full_name(IMU) == "sensor_msgs.msg.pb.Imu"
+    assert type_of_proto_name("sensor_msgs.msg.pb.Imu") == IMU
+    for other in (
+        "sensor_msgs.Imu",
+        "sensor_msgs.msg.pb.Imu.Part",
+        "foxglove.pb.msg.Imu",
+        "sensor_msgs.msg.pb.Ï",
+    ):
+        assert type_of_proto_name(other) is None
     assert proto_path(TypeName("std_srvs", "srv", "SetBool")) == "std_srvs/srv/SetBool.proto"
 
 

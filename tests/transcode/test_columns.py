@@ -26,7 +26,7 @@ from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.find import store_source
 from rosidl_adapter_proto.interfaces.store import distributions
 from rosidl_adapter_proto.schema.registry import Schema
-from rosidl_adapter_proto.transcode import TranscodeError
+from rosidl_adapter_proto.transcode import TranscodeError, Transcoder
 from rosidl_adapter_proto.transcode.arrow import ColumnReader
 from tests.columns import row_of, rows_of, schema_of
 
@@ -332,6 +332,15 @@ def test_too_many_columns() -> None:
         ColumnReader(schema_of(types, "test/msg/D2"))
     assert str(caught.value) == ("test/msg/D2: it has more than 10000 columns; choose some of its fields")
     assert ColumnReader(schema_of(types, "test/msg/D2"), ["f1.f2"]).arrow_schema.names == ["f1"]
+
+
+@pytest.mark.parametrize("length", [300_000_000, 4_000_000_000])
+def test_messages_that_are_too_large(length: int) -> None:
+    schema = TypeRegistry.from_texts({"test/msg/Large": f"float64[{length}] x"})["test/msg/Large"]
+    for make in (ColumnReader, lambda large: Transcoder(large.type_description, large.descriptor)):
+        with pytest.raises(SchemaError) as caught:
+            make(schema)
+        assert str(caught.value) == "test/msg/Large: a message of this type is larger than 2 GiB"
 
 
 def test_a_message_that_fails_leaves_no_row() -> None:

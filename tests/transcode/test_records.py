@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from ros_types import struct_type, transcoder
 
 from rosidl_adapter_proto.errors import Error
-from rosidl_adapter_proto.transcode import RecordsError, TranscodeError, Transcoder
+from rosidl_adapter_proto.transcode import RecordsError, TranscodeError, Transcoder, _core
 from rosidl_adapter_proto.transcode.records import (
     Converted,
     Direction,
@@ -143,6 +143,24 @@ def test_other_records_are_told() -> None:
     assert RecordConverter({7: Route(7), 8: Route(8)}).convert(chunk).data == simple_chunk((7, b"one")) + (
         simple_chunk((8, b"two"))
     )
+
+
+def test_records_that_are_no_messages_are_few() -> None:
+    empty = record(0x80, b"")
+    assert len(read_records(empty * 2**18).others) == 2**18
+    with pytest.raises(RecordsError) as caught:
+        read_records(empty * (2**18 + 1))
+    assert str(caught.value) == (
+        "byte 2359296 of the chunk: the chunk has more than 262144 records that are no messages; it is damaged"
+    )
+
+
+@pytest.mark.parametrize("kind", [_core.Memory, _core.PooledMemory])
+def test_memory_is_made_by_the_native_module(kind: type[_core.Memory]) -> None:
+    with pytest.raises(TypeError, match="no constructor defined"):
+        kind()
+    with pytest.raises(BufferError, match=r"^only the native module makes memory$"):
+        memoryview(kind.__new__(kind))
 
 
 def mcap_file(messages: Sequence[Message]) -> bytes:

@@ -25,6 +25,10 @@ constexpr uint64_t kMessageFields = 2 + 4 + 8 + 8;  // what stands before the da
 // Sizes and places in MCAP have more bits, but no reader wants such a chunk in memory.
 constexpr uint64_t kMaximumChunk = 0xffffffff;
 
+// Records that are no messages become objects, of many times their size. Twice as many as there are ids of
+// schemas and channels together.
+constexpr uint64_t kMaximumOthers = 0x40000;
+
 enum class RecordsReason : uint8_t {
   None,
   HeaderCut,
@@ -34,6 +38,7 @@ enum class RecordsReason : uint8_t {
   NoRoute,
   TooLarge,
   ChunkTooLarge,
+  TooManyOthers,
   OutOfMemory,
 };
 

@@ -18,6 +18,7 @@ from rosidl_adapter_proto.cli.options import (
     setting_option,
     source_options,
 )
+from rosidl_adapter_proto.cli.texts import show_warnings
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.generate import Options, Progress, Result, generate
 from rosidl_adapter_proto.generate.request import find_request
@@ -87,8 +88,7 @@ def command(
         result = generate(
             request, catalog, output, options, check=check, renumber=renumber, progress=progress
         )
-    for warning in result.warnings:
-        click.echo(f"Warning: {warning}", err=True)
+    show_warnings(result.warnings)
     if verbose:
         for name in result.interfaces:
             click.echo(f"{name} from {catalog.definition(name).file}")
@@ -115,8 +115,7 @@ def _recorded(bags: Sequence[str], include: Iterable[Path], distro: str | None) 
         topics += (each for id, each in reader.topics.items() if counts.get(id) or each.definition.encoding)
     types = BagTypes(topics, include, distro)
     recorded = types.recorded_types()
-    for warning in types.warnings:
-        click.echo(f"Warning: {warning}", err=True)
+    show_warnings(types.warnings)
     if not recorded.types:
         raise RequestError(f"{', '.join(bags)}: no topic has messages of a ROS type")
     return recorded

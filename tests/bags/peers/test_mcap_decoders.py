@@ -5,7 +5,8 @@ from __future__ import annotations
 from array import array
 from io import BytesIO
 
-import pytest
+import mcap_protobuf.decoder
+import mcap_ros2.decoder
 from google.protobuf import descriptor_pb2, wrappers_pb2
 from mcap.reader import make_reader
 
@@ -41,14 +42,12 @@ def write(topic: Topic, message: bytes) -> BytesIO:
 
 
 def test_ros_2() -> None:
-    decoders = pytest.importorskip("mcap_ros2.decoder")
     file = write(STRING, b"\x00\x01\x00\x00\x06\x00\x00\x00hello\x00")
-    reader = make_reader(file, decoder_factories=[decoders.DecoderFactory()])
+    reader = make_reader(file, decoder_factories=[mcap_ros2.decoder.DecoderFactory()])
     assert [decoded.decoded_message.data for decoded in reader.iter_decoded_messages()] == ["hello"]
 
 
 def test_protobuf() -> None:
-    decoders = pytest.importorskip("mcap_protobuf.decoder")
     file = write(VALUE, wrappers_pb2.StringValue(value="hello").SerializeToString())
-    reader = make_reader(file, decoder_factories=[decoders.DecoderFactory()])
+    reader = make_reader(file, decoder_factories=[mcap_protobuf.decoder.DecoderFactory()])
     assert [decoded.decoded_message.value for decoded in reader.iter_decoded_messages()] == ["hello"]

@@ -45,15 +45,18 @@ def heights(folder: Path) -> list[float]:
     ]
 
 
+@pytest.mark.usefixtures("cluster")  # on which Daft runs then
 def test_daft(recordings: Path) -> None:
     found = run_page("daft.md")
+    assert found["daft"].get_or_infer_runner_type() == "ray"
     expected = heights(recordings)
     assert found["strongest"].to_pydict() == {"strongest": [max(expected)], "messages": [len(expected)]}
     assert found["message"].transforms[0].child_frame_id == "base_link"
 
 
 @pytest.mark.filterwarnings("ignore:.*deprecated:DeprecationWarning")  # Ray warns of what it does itself
-def test_ray_data(recordings: Path, cluster: Any) -> None:
+@pytest.mark.usefixtures("cluster")
+def test_ray_data(recordings: Path) -> None:
     found = run_page("ray-data.md")
     expected = heights(recordings)
     assert found["imu"].count() == len(expected)

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, fields_option, time_options
 
 
 @click.command("cat")
 @click.argument("bag", type=click.Path())
 @click.argument("topics", nargs=-1, required=True, metavar="TOPIC...")
-@click.option("--fields", metavar="A.B,C", help="Print only these fields of the messages.")
+@fields_option
 @time_options
 @click.option("--limit", type=click.IntRange(min=0), help="Print so many messages at most.")
 @bag_source_options
 def command(
     bag: str,
     topics: tuple[str, ...],
-    fields: str | None,
+    fields: list[str] | None,
     start: int | None,
     end: int | None,
     limit: int | None,
@@ -31,9 +31,8 @@ def command(
     from rosidl_adapter_proto.bags.bag import open_bag
     from rosidl_adapter_proto.bags.message_json import chosen_fields, message_json
 
-    names = None if fields is None else [name.strip() for name in fields.split(",")]
-    chosen = chosen_fields(names or ())
+    chosen = chosen_fields(fields or ())
     with open_bag(bag, include=include, distro=distro) as opened:
-        messages = opened.messages(topics, start=start, end=end, fields=names)
+        messages = opened.messages(topics, start=start, end=end, fields=fields)
         for recorded in islice(messages, limit):
             click.echo(message_json(recorded, chosen))

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from rosidl_adapter_proto.cli.options import bag_source_options
+from rosidl_adapter_proto.cli.texts import show_warnings, size_text
 from rosidl_adapter_proto.time import to_datetime
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.information import BagInformation
-
-_UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
 
 
 @click.command("info")
@@ -40,7 +39,7 @@ def _print(information: BagInformation) -> None:
     rows = [
         *(("" if index else "files:", file) for index, file in enumerate(information.files)),
         ("storage:", ", ".join([*information.storage, *information.compression])),
-        ("size:", _size(information.size)),
+        ("size:", size_text(information.size)),
         ("messages:", str(information.message_count)),
     ]
     if information.message_count:
@@ -68,15 +67,7 @@ def _print(information: BagInformation) -> None:
     for topic, kind, format_name, count, rate, origin in [head, *table]:
         left = f"{topic:{widths[0]}}  {kind:{widths[1]}}  {format_name:{widths[2]}}"
         click.echo(f"{left}  {count:>{widths[3]}}  {rate:>{widths[4]}}  {origin}")
-    for warning in information.warnings:
-        click.echo(f"Warning: {warning}", err=True)
-
-
-def _size(size: float) -> str:
-    unit = 0
-    while size >= 1000 and unit < len(_UNITS) - 1:
-        size, unit = size / 1000, unit + 1
-    return f"{size:.3g} {_UNITS[unit]}"
+    show_warnings(information.warnings)
 
 
 def _date(nanoseconds: int) -> str:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, fields_option, time_options
+from rosidl_adapter_proto.cli.texts import show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 
@@ -23,7 +24,7 @@ from rosidl_adapter_proto.errors import RequestError
     type=click.Choice(["parquet", "arrow", "csv"]),
     help="What to write, where the suffix of FILE does not say.",
 )
-@click.option("--fields", metavar="A.B,C", help="Only these fields of the messages.")
+@fields_option
 @time_options
 @bag_source_options
 def command(
@@ -31,7 +32,7 @@ def command(
     topic: str,
     output: str,
     file_format: str | None,
-    fields: str | None,
+    fields: list[str] | None,
     start: int | None,
     end: int | None,
     include: tuple[Path, ...],
@@ -48,7 +49,6 @@ def command(
         from rosidl_adapter_proto.bags.table import write_table
     except ImportError as error:
         raise RequestError(str(error)) from None
-    names = None if fields is None else [name.strip() for name in fields.split(",")]
     with open_bag(bag, include=include, distro=distro) as opened:
         found = opened.topics.get(topic)
         with _progress_bar(found.message_count if found else 0) as progress:
@@ -57,13 +57,12 @@ def command(
                 topic,
                 output,
                 file_format=file_format,
-                fields=names,
+                fields=fields,
                 start=start,
                 end=end,
                 progress=progress,
             )
-        for warning in opened.warnings:
-            click.echo(f"Warning: {warning}", err=True)
+        show_warnings(opened.warnings)
     click.echo(f"{output}: {rows} rows")
 
 

@@ -1,0 +1,34 @@
+"""What several commands print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import click
+
+_UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
+
+
+def show_warnings(warnings: Iterable[str]) -> None:
+    """Print what the user should know."""
+    for warning in warnings:
+        click.echo(f"Warning: {warning}", err=True)
+
+
+def size_text(size: float) -> str:
+    """Return a number of bytes as people read it."""
+    unit = 0
+    while size >= 1000 and unit < len(_UNITS) - 1:
+        size /= 1000
+        unit += 1
+    digits = 0 if unit == 0 or size >= 99.95 else 1
+    return f"{size:.{digits}f} {_UNITS[unit]}"
+
+
+def time_text(seconds: float) -> str:
+    """Return a duration as people read it."""
+    if seconds < 59.95:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
