@@ -56,3 +56,14 @@ def test_imports_go_one_way() -> None:
             if here in ("adapter", "transcode", "errors") and top in ONLY_GENERATING:
                 wrong.append(f"{file}:{line}: {top} is only for generating")
     assert not wrong, "\n".join(wrong)
+
+
+def test_the_architecture_says_what_each_file_of_bags_does() -> None:
+    text = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    table = text.partition("## The files of `bags/`\n")[2].partition("\n## ")[0]
+    missing = [
+        file.name
+        for file in sorted((PACKAGE / "bags").glob("*.py"))
+        if file.stem not in ENTRANCES and f"`{file.name}`" not in table
+    ]
+    assert not missing

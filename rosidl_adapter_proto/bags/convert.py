@@ -236,7 +236,6 @@ def _check_names(patterns: Sequence[str], topics: Sequence[Topic]) -> None:
 def _names(recording: Recording, storage: str) -> list[str]:
     """Return the names of the files of the result, after those of the source."""
     stems = [Path(find_place(file.path).name.removesuffix(ZSTD_SUFFIX)).stem for file in recording.files]
-    return [
-        (stem if stems.count(stem) == 1 else f"{stem}_{index}") + WRITTEN_SUFFIXES[storage]
-        for index, stem in enumerate(stems)
-    ]
+    if len(set(stems)) < len(stems):
+        stems = [f"{stem}_{index}" for index, stem in enumerate(stems)]
+    return [stem + WRITTEN_SUFFIXES[storage] for stem in stems]

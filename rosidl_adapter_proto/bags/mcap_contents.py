@@ -21,7 +21,7 @@ from rosidl_adapter_proto.bags.mcap_records import (
     RECORD_HEAD,
     ChunkPlace,
     McapFile,
-    Place,
+    RecordPlace,
     opcode_name,
     parse,
 )
@@ -61,7 +61,7 @@ class Contents:
     schemas: dict[int, records.Schema] = field(default_factory=dict)
     channels: dict[int, records.Channel] = field(default_factory=dict)
     metadata: list[records.Metadata] = field(default_factory=list)
-    attachments: list[Place] = field(default_factory=list)
+    attachments: list[RecordPlace] = field(default_factory=list)
     statistics: Statistics = field(default_factory=Statistics)
     chunk_count: int | None = None
     chunk_topics: dict[int, frozenset[int]] = field(default_factory=dict)
@@ -79,7 +79,7 @@ def find_end(file: McapFile) -> int | None:
 
     try:
         for found in walk(file, stop):
-            if isinstance(found, Place) and found.opcode == Opcode.FOOTER:
+            if isinstance(found, RecordPlace) and found.opcode == Opcode.FOOTER:
                 end = found.end + len(MAGIC)
                 return end if end <= file.size and file.read(found.end, end) == MAGIC else None
     except BagError:
@@ -120,8 +120,8 @@ def read_summary(file: McapFile, footer: records.Footer) -> Contents | None:
     contents = Contents()
     statistics = None
     # By place: what two indexes point to is there once.
-    metadata: dict[int, Place] = {}
-    attachments: dict[int, Place] = {}
+    metadata: dict[int, RecordPlace] = {}
+    attachments: dict[int, RecordPlace] = {}
     known_topics: dict[frozenset[int], frozenset[int]] = {}
     for place in file.places(footer.summary_start, end):
         if place.opcode in DEFINITIONS:
@@ -164,7 +164,7 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
     times: list[int] = []
     for found in walk(file, damaged):
         try:
-            if isinstance(found, Place):
+            if isinstance(found, RecordPlace):
                 _add(contents, file, found)
                 continue
             chunk = file.stored_chunk(found) if isinstance(found, ChunkPlace) else found
@@ -187,7 +187,7 @@ def scan(file: McapFile, damaged: Damaged) -> Contents:
     return contents
 
 
-def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | StoredChunk]:
+def walk(file: McapFile, damaged: Damaged) -> Iterator[RecordPlace | ChunkPlace | StoredChunk]:
     """Yield what is in a file, in its order: chunks, messages without one, and places of other records.
 
     Args:
@@ -199,7 +199,7 @@ def walk(file: McapFile, damaged: Damaged) -> Iterator[Place | ChunkPlace | Stor
     while start < file.size:
         try:
             place = file.place(start, file.size)
-            found: Place | ChunkPlace | StoredChunk = place
+            found: RecordPlace | ChunkPlace | StoredChunk = place
             following = place.end
             if place.opcode == Opcode.MESSAGE:
                 found, following = file.loose_messages(place)
@@ -257,7 +257,7 @@ def missing_schemas(contents: Contents, path: str) -> list[BagError]:
     ]
 
 
-def _add(contents: Contents, file: McapFile, place: Place) -> None:
+def _add(contents: Contents, file: McapFile, place: RecordPlace) -> None:
     """Add a record of the data section."""
     if place.opcode in DEFINITIONS:
         add_definition(contents, place.opcode, file.read(place.content, place.end), file.where(place.start))
@@ -267,7 +267,7 @@ def _add(contents: Contents, file: McapFile, place: Place) -> None:
         contents.attachments.append(place)
 
 
-def _indexed(file: McapFile, offset: int, opcode: Opcode, index: Place) -> Place:
+def _indexed(file: McapFile, offset: int, opcode: Opcode, index: RecordPlace) -> RecordPlace:
     """Return the record that an index in the summary points to."""
     if offset < index.start:
         place = file.place(offset, index.start)

@@ -20,7 +20,7 @@ from rosidl_adapter_proto.bags.mcap_contents import (
     scan,
     walk,
 )
-from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, Place
+from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, RecordPlace
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
 from rosidl_adapter_proto.bags.storage import MCAP
@@ -101,7 +101,7 @@ class McapReader:
         chunk_count = 0
         message_counts: list[int | None] = []
         for found in walk(self._file, self._damaged):
-            if isinstance(found, Place) and found.opcode == Opcode.MESSAGE_INDEX:
+            if isinstance(found, RecordPlace) and found.opcode == Opcode.MESSAGE_INDEX:
                 if isinstance(last, ChunkPlace):
                     message_counts[-1] = (message_counts[-1] or 0) + (found.end - found.content - 6) // 16
                 continue
@@ -109,7 +109,7 @@ class McapReader:
             if chunk is not None:
                 yield replace(chunk, message_count=message_counts[-1])
                 chunk = None
-            if isinstance(found, Place):
+            if isinstance(found, RecordPlace):
                 self._check(found)
                 continue
             last = found
@@ -185,7 +185,7 @@ class McapReader:
     def _warn(self, warning: str) -> None:
         self._warnings[warning] = None
 
-    def _check(self, place: Place) -> None:
+    def _check(self, place: RecordPlace) -> None:
         """Compare a record with what is known of the file."""
         where = self._file.where(place.start)
         if (

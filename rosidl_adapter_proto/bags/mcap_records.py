@@ -50,7 +50,7 @@ _Record = TypeVar("_Record", bound=records.McapRecord)
 
 
 @dataclass(frozen=True)
-class Place:
+class RecordPlace:
     """Where a record is.
 
     Attributes:
@@ -126,7 +126,7 @@ class McapFile:
             crc = crc32(self.read(piece, min(piece + PIECE_SIZE, end)), crc)
         return crc
 
-    def place(self, start: int, limit: int) -> Place:
+    def place(self, start: int, limit: int) -> RecordPlace:
         """Return where the record is that begins at `start` and ends at `limit` or before.
 
         Raises:
@@ -148,16 +148,16 @@ class McapFile:
             raise BagError(
                 f"{self.where(start)}: {opcode_name(opcode)} has {length} bytes; up to {largest} are read"
             )
-        return Place(opcode, start, content, content + length)
+        return RecordPlace(opcode, start, content, content + length)
 
-    def places(self, start: int, end: int) -> Iterator[Place]:
+    def places(self, start: int, end: int) -> Iterator[RecordPlace]:
         """Yield where the records between two places are."""
         while start < end:
             place = self.place(start, end)
             yield place
             start = place.end
 
-    def record(self, kind: type[_Record], place: Place) -> _Record:
+    def record(self, kind: type[_Record], place: RecordPlace) -> _Record:
         """Return what is in a record of a kind that `mcap.records` knows.
 
         Raises:
@@ -165,7 +165,7 @@ class McapFile:
         """
         return parse(kind, self.read(place.content, place.end), f"{self.where(place.start)}: {place.name}")
 
-    def attachment(self, place: Place) -> Attachment:
+    def attachment(self, place: RecordPlace) -> Attachment:
         """Return an attachment, compared with its checksum.
 
         Raises:
@@ -184,11 +184,11 @@ class McapFile:
             attachment.data,
         )
 
-    def damaged(self, place: Place, reason: str) -> BagError:
+    def damaged(self, place: RecordPlace, reason: str) -> BagError:
         """Return the error for a record whose content is wrong."""
         return BagError(f"{self.where(place.start)}: {place.name} is damaged: {reason}")
 
-    def chunk(self, place: Place) -> ChunkPlace:
+    def chunk(self, place: RecordPlace) -> ChunkPlace:
         """Return what a Chunk record says of itself.
 
         Raises:
@@ -231,7 +231,7 @@ class McapFile:
             chunk.start,
         )
 
-    def loose_messages(self, first: Place) -> tuple[StoredChunk, int]:
+    def loose_messages(self, first: RecordPlace) -> tuple[StoredChunk, int]:
         """Return Message records that are in no chunk, as if they were one, and the place behind them.
 
         They are about 1 MB, but always at least the one message.

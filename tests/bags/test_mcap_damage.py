@@ -18,7 +18,7 @@ from mcap.writer import CompressionType
 
 from rosidl_adapter_proto.bags.compression import records_of
 from rosidl_adapter_proto.bags.mcap_reader import McapReader
-from rosidl_adapter_proto.bags.mcap_records import MAGIC, McapFile, Place
+from rosidl_adapter_proto.bags.mcap_records import MAGIC, McapFile, RecordPlace
 from rosidl_adapter_proto.bags.model import Selection
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.error import RecordsError
@@ -26,7 +26,7 @@ from rosidl_adapter_proto.transcode.records import read_records
 from tests.bags.mcap_files import MESSAGES, NO_SUMMARY, mcap_file, messages_of, reader_of
 
 
-def places(data: bytes, opcode: Opcode) -> list[Place]:
+def places(data: bytes, opcode: Opcode) -> list[RecordPlace]:
     """Return where the records of a kind are in a file that is whole."""
     found = McapFile(BytesIO(data), "").places(8, len(data) - 8)
     return [place for place in found if place.opcode == opcode]
