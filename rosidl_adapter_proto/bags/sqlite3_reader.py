@@ -32,6 +32,7 @@ from rosidl_adapter_proto.bags.model import (
 )
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.bags.storage import SQLITE3
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
 
@@ -66,7 +67,7 @@ class SqliteReader:
 
     def __init__(self, file_path: str, path: str = "", *, salvage: bool = False) -> None:
         self.path = path = path or file_path
-        self.warnings: list[str] = []
+        self.warnings = WarningList()
         self.is_damaged = False
         self._salvage = salvage
         with ExitStack() as stack:
@@ -143,7 +144,7 @@ class SqliteReader:
         if not journals:
             return self._whole_pages(path, stack) if self._salvage else path
         names = " and ".join(journal.name for journal in journals)
-        self.warnings.append(
+        self.warnings.add(
             f"{self.path}: its recorder did not finish; {names} beside it was read too, from a copy"
         )
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-")))
@@ -392,8 +393,7 @@ class SqliteReader:
 
     def _note(self, warning: str) -> None:
         self.is_damaged = True
-        if warning not in self.warnings:
-            self.warnings.append(warning)
+        self.warnings.add(warning)
 
 
 def definition_names(type_name: str) -> list[str]:
