@@ -23,7 +23,8 @@ from rosidl_adapter_proto.bags.metadata import METADATA_FILE, SERIALIZED_METADAT
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.places import RemotePath, find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
-from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteReader
+from rosidl_adapter_proto.bags.sqlite3_database import JOURNAL_SUFFIXES
+from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, MCAP, ROSBAG, SQLITE3, StorageReader
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
