@@ -4,65 +4,70 @@ from __future__ import annotations
 
 import struct
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
 from bag_maker import typestore
+from isal.isal_zlib import crc32
 from messages import assign_to_protobuf, copy_header, copy_imu, copy_vector
+
+from rosidl_adapter_proto.bags.compression import compress, records_of
+from rosidl_adapter_proto.bags.model import StoredChunk
 
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK = 0x06
 RECORD = struct.Struct("<BQ")  # of a record: its opcode and its length (https://mcap.dev/spec#records)
+CHUNK_HEAD = struct.Struct("<QQQII")
 
 
 def copy_chunks(source: Path, destination: Path, compression: str, threads: int) -> None:
-    """Read, decompress, compress and write the chunks of an MCAP file without looking into them.
+    """Copy an MCAP file without looking into its chunks.
 
-    What else is in the file is copied, so that as much is written as in a real one; its index leads nowhere.
+    Each is read, decompressed, compared with its checksum, compressed, given its checksum and written, by the code that
+    conversions have for that. What else is in the file is copied, so that as much is written as in a real one; its
+    index leads nowhere.
     """
     with source.open("rb") as read, destination.open("wb") as write, ThreadPoolExecutor(threads) as pool:
         write.write(read.read(len(MAGIC)))
-        under_way: deque[Callable[[], bytes]] = deque()
-        for record in records(read):
-            if record[0] != CHUNK:
-                under_way.append(record.__bytes__)
+        under_way: deque[Callable[[], Sequence[Any]]] = deque()
+        for opcode, content in records(read):
+            if opcode != CHUNK:
+                under_way.append(partial(record, opcode, content))
             elif threads == 1:
-                under_way.append(chunk_again(record, compression).__bytes__)
+                under_way.append(partial(chunk_again, content, compression))
             else:
-                under_way.append(pool.submit(chunk_again, record, compression).result)
+                under_way.append(pool.submit(chunk_again, content, compression).result)
             while len(under_way) > 4 * threads:
-                write.write(under_way.popleft()())
+                write.writelines(under_way.popleft()())
         for result in under_way:
-            write.write(result())
+            write.writelines(result())
+        write.write(MAGIC)
 
 
-def records(file: IO[bytes]) -> Iterator[bytes]:
-    """Yield the records of an MCAP file."""
-    while len(start := file.read(RECORD.size)) == RECORD.size:
-        yield start + file.read(RECORD.unpack(start)[1])
+def records(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+    """Yield the opcode and the content of the records of an MCAP file."""
+    while len(head := file.read(RECORD.size)) == RECORD.size:
+        opcode, length = RECORD.unpack(head)
+        yield opcode, file.read(length)
 
 
-def chunk_again(record: bytes, compression: str) -> bytes:
+def record(opcode: int, *contents: Any) -> Sequence[Any]:
+    """Return the bytes of a record, in pieces."""
+    return RECORD.pack(opcode, sum(map(len, contents))), *contents
+
+
+def chunk_again(content: bytes, compression: str) -> Sequence[Any]:
     """Return the record of a chunk (https://mcap.dev/spec#chunk-op0x06), decompressed and compressed again."""
-    from rosidl_adapter_proto.bags.compression import compress
-
-    (name_size,) = struct.unpack_from("<I", record, RECORD.size + 28)
-    at = RECORD.size + 32 + name_size + 8
-    again = compress(decompress(memoryview(record)[at:], compression), compression)
-    head = record[RECORD.size : at - 8] + struct.pack("<Q", len(again))
-    return b"".join((RECORD.pack(CHUNK, len(head) + len(again)), head, again))
-
-
-def decompress(data: memoryview, compression: str) -> Any:
-    import lz4.frame
-    import zstandard
-
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().decompress(data)
-    return lz4.frame.decompress(data) if compression == "lz4" else data
+    start_time, end_time, size, crc, name_size = CHUNK_HEAD.unpack_from(content)
+    data = memoryview(content)[CHUNK_HEAD.size + name_size + 8 :]
+    plain = records_of(StoredChunk("", data, compression, size, crc, start_time, end_time))
+    again = compress(plain, compression)
+    head = CHUNK_HEAD.pack(start_time, end_time, size, crc32(plain), name_size)
+    return record(CHUNK, head, compression.encode(), len(again).to_bytes(8, "little"), again)
 
 
 def copy_with_library(source: Path, destination: Path, compression: str) -> None:

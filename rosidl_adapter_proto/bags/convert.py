@@ -39,8 +39,8 @@ def convert_bag(
     target_format: str | None = None,
     storage: str | None = None,
     compression: str | None = None,
-    topics: Iterable[str] = (),
-    excluded_topics: Iterable[str] = (),
+    topics: str | Iterable[str] = (),
+    excluded_topics: str | Iterable[str] = (),
     start: Time | None = None,
     end: Time | None = None,
     on_error: str = "stop",
@@ -64,7 +64,7 @@ def convert_bag(
         target_format: What to convert to; by default `protobuf`, and `cdr` if the messages are protobuf.
         storage: The storage of the result, `mcap` or `sqlite3`; by default that of the source, and `mcap` for ROS 1.
         compression: How chunks are compressed, `none`, `zstd` or `lz4`; by default as in the source.
-        topics: Which topics to convert: names, or patterns with `*`, `?` and `[...]`; by default all.
+        topics: Which topics to convert: one or several names, or patterns with `*`, `?` and `[...]`; by default all.
         excluded_topics: Which topics to leave out, likewise.
         start: When the first message to convert was recorded: a `datetime`, nanoseconds since 1970, or another time;
             by default there is no start.
@@ -110,8 +110,8 @@ def convert_bag(
 
 def settings_of(
     *,
-    topics: Iterable[str] = (),
-    excluded_topics: Iterable[str] = (),
+    topics: str | Iterable[str] = (),
+    excluded_topics: str | Iterable[str] = (),
     start: Time | None = None,
     end: Time | None = None,
     on_error: str = "stop",
@@ -121,8 +121,8 @@ def settings_of(
 ) -> Settings:
     """Return the settings that are the arguments of `convert_bag`."""
     return Settings(
-        topics=tuple(topics),
-        excluded_topics=tuple(excluded_topics),
+        topics=_patterns(topics),
+        excluded_topics=_patterns(excluded_topics),
         start_time=0 if start is None else to_nanoseconds(start),
         end_time=None if end is None else to_nanoseconds(end),
         on_error=OnError(on_error),
@@ -130,6 +130,10 @@ def settings_of(
         registry=registry or ConverterRegistry(),
         **others,
     )
+
+
+def _patterns(topics: str | Iterable[str]) -> tuple[str, ...]:
+    return (topics,) if isinstance(topics, str) else tuple(topics)
 
 
 def convert_with(
@@ -232,7 +236,6 @@ def _check_names(patterns: Sequence[str], topics: Sequence[Topic]) -> None:
 def _names(recording: Recording, storage: str) -> list[str]:
     """Return the names of the files of the result, after those of the source."""
     stems = [Path(find_place(file.path).name.removesuffix(ZSTD_SUFFIX)).stem for file in recording.files]
-    return [
-        (stem if stems.count(stem) == 1 else f"{stem}_{index}") + WRITTEN_SUFFIXES[storage]
-        for index, stem in enumerate(stems)
-    ]
+    if len(set(stems)) < len(stems):
+        stems = [f"{stem}_{index}" for index, stem in enumerate(stems)]
+    return [stem + WRITTEN_SUFFIXES[storage] for stem in stems]

@@ -27,7 +27,7 @@ from rosidl_adapter_proto.bags.storage import MCAP
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 
-_SALVAGE = "`--on-error skip` reads"
+_SALVAGE = "`bag convert --on-error skip` reads"
 
 _Chunk = TypeVar("_Chunk", ChunkPlace, StoredChunk)
 

@@ -269,7 +269,7 @@ class _OpenedFile:
     def _damaged(self, reason: str) -> None:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
-            raise BagError(f"{reason}; `--on-error skip` leaves such messages out")
+            raise BagError(f"{reason}; `bag convert --on-error skip` leaves such messages out")
         self._damages.add(reason)
 
     def _inner_metadata(self, reader: StorageReader) -> BagMetadata | None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rosidl_adapter_proto.bags.metadata import MAXIMUM_SIZE, METADATA_FILE, BagMetadata, read_metadata
-from rosidl_adapter_proto.bags.places import Place, find_place
+from rosidl_adapter_proto.bags.places import Place, file_size, find_place
 from rosidl_adapter_proto.bags.recorded_file import (
     ZSTD_SUFFIX,
     RecordedFile,
@@ -45,13 +45,12 @@ class Recording:
         return self.files[0].storage
 
     def count_warnings(self, message_count: int) -> list[str]:
-        """Return what to say if its files have less messages together than metadata.yaml says."""
+        """Return what to say if its files have fewer messages together than metadata.yaml says."""
         metadata = self.metadata
-        if (
-            metadata is None
-            or len(metadata.paths) != len(self.files)
-            or metadata.message_count <= message_count
-        ):
+        is_folder = self.path != self.files[0].path
+        if metadata is None or not (is_folder or len(metadata.paths) == 1):
+            return []
+        if metadata.message_count <= message_count:
             return []
         return [
             f"{self.path}: {METADATA_FILE} says {metadata.message_count} messages, but its files have {message_count}"
@@ -105,24 +104,41 @@ def _folder(folder: Place) -> Recording:
         (path for path in folder.iterdir() if Path(_plain_name(path)).suffix in SUFFIXES and path.is_file()),
         key=str,
     )
-    metadata = _read_metadata(place)
+    try:
+        metadata = _read_metadata(place)
+    except BagError as error:
+        raise BagError(
+            f"{error}; or remove it, and the files are read in the order of their messages"
+        ) from None
     if metadata is not None and metadata.paths:
         return _listed_files(folder, metadata, present)
     if not present:
         raise BagError(
             f"{folder}: no {METADATA_FILE} that names files, and no {' or '.join(SUFFIXES)} file in it"
         )
-    files = _by_start_time([recognize(str(path)) for path in present])
+    plain = {path.name for path in present}
+    twins = [path for path in present if path.name != _plain_name(path) in plain]
+    recognized, warnings = _recognized([path for path in present if path not in twins])
+    files = _by_start_time(recognized)
     names = ", ".join(find_place(file.path).name for file in files)
     reason = f"no {METADATA_FILE}" if metadata is None else f"{METADATA_FILE} names no files"
     warning = f"{folder}: {reason}; the files found, in the order of their first messages: {names}"
-    return Recording(str(folder), tuple(files), metadata, (warning,))
+    warnings += [f"{path}: left out, since {_plain_name(path)} is there" for path in twins]
+    return Recording(str(folder), tuple(files), metadata, (warning, *warnings))
+
+
+def _recognized(paths: Sequence[Place]) -> tuple[list[RecordedFile], list[str]]:
+    """Return what files are, and warnings; a recorder that was killed leaves one behind that has nothing in it."""
+    empty = [path for path in paths if not file_size(path)]
+    if len(empty) == len(paths):
+        empty = []  # which is then an error
+    files = [recognize(str(path)) for path in paths if path not in empty]
+    return files, [f"{path}: empty; it is left out" for path in empty]
 
 
 def _listed_files(folder: Place, metadata: BagMetadata, present: Sequence[Place]) -> Recording:
     paths = [_listed_file(folder, name) for name in metadata.paths]
-    files = tuple(recognize(str(path)) for path in paths)
-    warnings: list[str] = []
+    files, warnings = _recognized(paths)
     listed = {_plain_name(path) for path in paths}
     others = ", ".join(path.name for path in present if _plain_name(path) not in listed)
     if others:
@@ -132,7 +148,7 @@ def _listed_files(folder: Place, metadata: BagMetadata, present: Sequence[Place]
         warnings.append(
             f"{folder}: {METADATA_FILE} says {metadata.storage}, but there is {', '.join(sorted(storages))}"
         )
-    return Recording(str(folder), files, metadata, tuple(warnings))
+    return Recording(str(folder), tuple(files), metadata, tuple(warnings))
 
 
 def _listed_file(folder: Place, name: str) -> Place:
@@ -153,7 +169,7 @@ def _plain_name(path: Place) -> str:
 def _by_start_time(files: list[RecordedFile]) -> list[RecordedFile]:
     times: dict[str, tuple[bool, int]] = {}
     for file in files:
-        with open_reader(file, None) as reader:
+        with open_reader(file, None, salvage=True) as reader:  # what is damaged is said when it is read
             times[file.path] = not reader.statistics.message_count, reader.statistics.start_time
     return sorted(files, key=lambda file: times[file.path])  # empty files come last
 
@@ -175,4 +191,7 @@ def _read_metadata(place: Place) -> BagMetadata | None:
     if not place.is_file():
         return None
     with open_file(str(place)) as file:
-        return read_metadata(file.read(MAXIMUM_SIZE + 1), str(place))
+        data = file.read(MAXIMUM_SIZE + 1)
+    return (
+        read_metadata(data, str(place)) if data.strip() else None
+    )  # as a recorder leaves it that was killed

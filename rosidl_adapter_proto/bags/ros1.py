@@ -260,7 +260,7 @@ class Ros1Reader:
             self._add_index(start)
         except BagError as error:
             if not salvage:
-                raise BagError(f"{error}; `--on-error skip` reads what is whole") from error
+                raise BagError(f"{error}; `bag convert --on-error skip` reads what is whole") from error
             self._contents = _Contents()
             self._tolerant = True
             self._tolerate(error, "read from its beginning, without the index")

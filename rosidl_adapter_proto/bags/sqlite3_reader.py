@@ -125,7 +125,9 @@ class SqliteReader:
         try:
             return self._connection.execute(query).fetchall()
         except _ERRORS as error:
-            advice = "; `--on-error skip` reads what is whole" if "malformed" in str(error) else ""
+            advice = (
+                "; `bag convert --on-error skip` reads what is whole" if "malformed" in str(error) else ""
+            )
             raise BagError(f"{self.path}: {reason_of(error)}{advice}") from None
 
     def _tables(self) -> list[str]:

@@ -19,7 +19,7 @@ from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError, DefinitionError, MissingDefinitionError, SchemaError
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog, interface_base
-from rosidl_adapter_proto.interfaces.find import Definition, Package
+from rosidl_adapter_proto.interfaces.find import Definition, Package, store_source
 from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.recorded import (
     ENCODINGS,
@@ -30,6 +30,7 @@ from rosidl_adapter_proto.interfaces.recorded import (
     recorded_text,
     recorded_type_name,
 )
+from rosidl_adapter_proto.interfaces.store import distributions
 from rosidl_adapter_proto.schema.pools import MessageClass
 from rosidl_adapter_proto.schema.registry import Schema, TypeRegistry
 from rosidl_adapter_proto.schema.typemap import type_of_proto_name
@@ -150,6 +151,12 @@ class BagTypes:
             name = _ros_type(topic)
             own = self._definitions(topic)
             schema = self._registry(name, own)[name]
+            if (
+                name not in own
+                and topic.type_hash.startswith(_KNOWN_HASH)
+                and schema.type_hash != topic.type_hash
+            ):
+                schema = _of_its_version(topic, name) or schema
             self._check_version(topic, schema, own)
             return self._with_recorded_class(schema, topic)
         except MissingDefinitionError as error:
@@ -224,6 +231,16 @@ class BagTypes:
         catalog = Catalog((recorded_source(definitions), *self._elsewhere.sources))
         is_event = name.namespace != "msg" and name.name.endswith("_Event")
         return TypeRegistry(catalog, events=is_event)
+
+
+def _of_its_version(topic: Topic, name: TypeName) -> Schema | None:
+    """Return a type as it is in the distribution of ROS where it has the hash it was recorded with, if there is one."""
+    for distribution in distributions():
+        catalog = Catalog((store_source(distribution),))
+        with contextlib.suppress(DefinitionError):
+            if catalog.hash(name) == topic.type_hash:
+                return TypeRegistry(catalog)[name]
+    return None
 
 
 def protobuf_definition(schema: Schema) -> RecordedDefinition:

@@ -126,14 +126,14 @@ def time_options(command: Command) -> Command:
     return start(end(command))
 
 
-def fields_option(help_text: str) -> Callable[[Command], Command]:
-    """Return the decorator that adds the option of chosen fields; they reach the command as a list, or None."""
+def _names(context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> list[str] | None:
+    return [name.strip() for text in texts for name in text.split(",")] or None
 
-    def names(context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> list[str] | None:
-        return [name.strip() for text in texts for name in text.split(",")] or None
 
-    help_text = f"{help_text} May be repeated."
-    return click.option("--fields", metavar="A.B,C", multiple=True, callback=names, help=help_text)
+def fields_option(command: Command) -> Command:
+    """Add the option that chooses fields of messages; they reach the command as a list of names, or None."""
+    help_text = "Only these fields of the messages. May be repeated."
+    return click.option("--fields", metavar="A.B,C", multiple=True, callback=_names, help=help_text)(command)
 
 
 def plugin_option(command: Callable[..., Any]) -> Callable[..., Any]:

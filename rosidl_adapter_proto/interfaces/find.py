@@ -231,12 +231,8 @@ def prefix_sources() -> list[Source]:
         if not os.path.isdir(share):
             continue
         origin = f"ROS prefix {prefix}"
-        packages = {
-            entry.name: package
-            for entry in _scan(share)
-            if _is_package(entry) and (package := _read_package(Path(entry.path), entry.name, origin))
-        }
-        if packages:
+        packages = _InstalledPackages(share, origin)
+        if any(True for _ in packages):
             sources.append(Source(origin, packages))
     return sources
 
@@ -266,6 +262,29 @@ def store_source(distribution: str | None = None) -> Source:
         store.check_distribution(distribution)
     origin = f"embedded store {distribution}"
     return Source(origin, _StorePackages(distribution, origin), stands_in=True, limit="messages only")
+
+
+class _InstalledPackages(Mapping[str, Package]):
+    """The packages of a ROS installation, each of which is read when somebody asks for it."""
+
+    def __init__(self, share: Path, origin: str) -> None:
+        self._folders = {entry.name: Path(entry.path) for entry in _scan(share)}
+        self._origin = origin
+        self._read: dict[str, Package] = {}
+
+    def __getitem__(self, name: str) -> Package:
+        if name not in self._read:
+            folder = self._folders[name]
+            self._read[name] = _read_package(folder, name, self._origin) if _is_package(folder) else {}
+        if not self._read[name]:
+            raise KeyError(name)
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._folders if name in self)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
 class _StorePackages(Mapping[str, Package]):
@@ -309,9 +328,9 @@ def _unreadable(path: str | Path, error: OSError) -> DefinitionError:
     return DefinitionError(f"cannot read {path}: {error.strerror}")
 
 
-def _is_package(installed: os.DirEntry[str]) -> bool:
+def _is_package(installed: Path) -> bool:
     """Tell whether a folder in `share` has interfaces; ROS always installs some of their files to these places."""
-    return any(os.path.isdir(os.path.join(installed.path, namespace)) for namespace in NAMESPACES)
+    return any(os.path.isdir(installed / namespace) for namespace in NAMESPACES)
 
 
 def _package_folders(folder: Path, seen: set[str]) -> Iterator[Path]:

@@ -256,9 +256,10 @@ def test_sqlite3_and_back(threads: int) -> None:
     ("options", "chosen"),
     [
         ({"topics": ["/b"]}, B),
+        ({"topics": "/b"}, B),
         ({"topics": ["/[ac]", "/nothing*", "/b"], "excluded_topics": ["/b"]}, None),
         ({"topics": ["/[ac]"]}, A),
-        ({"excluded_topics": ["*b"]}, A),
+        ({"excluded_topics": "*b"}, A),
         ({"start": START + 3 * 10**9}, [each for each in MIXED if each.log_time >= START + 3 * 10**9]),
         ({"end": START + 3 * 10**9}, [each for each in MIXED if each.log_time < START + 3 * 10**9]),
         ({"start": START + 1, "end": START + 2, "topics": ["/a"]}, []),

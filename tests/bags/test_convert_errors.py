@@ -347,7 +347,7 @@ def test_reading_finds_another_number_of_messages() -> None:
 def test_a_truncated_file() -> None:
     whole = mcap_bytes(strings("/a", 40), compression=CompressionType.NONE)
     cut = whole[: len(whole) // 2]
-    assert "`--on-error skip` reads" in refused(cut)
+    assert "`bag convert --on-error skip` reads" in refused(cut)
 
     result = convert(cut, on_error="skip")
     found = contents(Path("out.mcap")).messages

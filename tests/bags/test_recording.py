@@ -89,6 +89,34 @@ def test_a_folder_without_metadata_is_read_in_the_order_of_time(split: tuple[Pat
     )
 
 
+def test_what_a_killed_recorder_leaves_is_read(split: tuple[Path, str]) -> None:
+    """Nothing in metadata.yaml, a file that is cut off, one that is empty, and one that was just being compressed."""
+    folder, storage = split
+    (folder / "metadata.yaml").touch()
+    last, empty, twin = (folder / name for name in _names(storage, "a_11", "a_12", "b_9"))
+    last.write_bytes(last.read_bytes()[:-200])
+    empty.touch()
+    twin = Path(f"{twin}.zstd")
+    twin.write_bytes(b"half")
+    recording = find_recording(str(folder))
+    assert [Path(file.path).name for file in recording.files] == _names(storage, "b_9", "b_10", "a_11")
+    assert recording.warnings[1:] == (
+        f"{empty}: empty; it is left out",
+        f"{twin}: left out, since {twin.stem} is there",
+    )
+
+
+def test_metadata_that_is_wrong_may_be_removed(split: tuple[Path, str]) -> None:
+    folder, _ = split
+    (folder / "metadata.yaml").write_text("- text")
+    with pytest.raises(BagError) as caught:
+        find_recording(str(folder))
+    assert str(caught.value) == (
+        f"{folder}/metadata.yaml: the text: expected names and values; "
+        "or remove it, and the files are read in the order of their messages"
+    )
+
+
 def test_a_file_that_is_listed_but_missing_is_an_error(split: tuple[Path, str]) -> None:
     folder, storage = split
     _describe(folder, "b_9.gone", storage=storage)
@@ -264,7 +292,7 @@ def test_messages_that_cannot_be_decompressed_are_said(tmp_path: Path, data: byt
     _describe(tmp_path, "a.db3", compression_mode="MESSAGE", compression_format="zstd")
     reason = f"{path}, table messages, rows 1 to 2: a message of /a, recorded at 1, cannot be decompressed: "
     with pytest.raises(
-        BagError, match=f"^{re.escape(reason + expected)}.*; `--on-error skip` leaves .* out$"
+        BagError, match=f"^{re.escape(reason + expected)}.*; `bag convert --on-error skip` leaves .* out$"
     ):
         _read(tmp_path)
     with find_recording(str(tmp_path)).open(0, salvage=True) as reader:

@@ -348,7 +348,7 @@ def test_a_database_that_lost_its_end_is_salvaged(tmp_path: Path) -> None:
     with pytest.raises(BagError) as caught:
         SqliteReader(str(path))
     assert str(caught.value) == (
-        f"{path}: sqlite3 says: database disk image is malformed; `--on-error skip` reads what is whole"
+        f"{path}: sqlite3 says: database disk image is malformed; `bag convert --on-error skip` reads what is whole"
     )
     with SqliteReader(str(path), salvage=True) as reader:
         rows = rows_of(reader)

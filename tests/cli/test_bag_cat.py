@@ -115,7 +115,6 @@ def test_chosen_fields_of_elements(run: Run) -> None:
         ("2023-11-14T22:13:20.990000001Z", "2023-11-14T22:13:21.000000001Z", START + 995_000_000, 2),
         (str(START + 10**9), str(START + 1_005_000_000), START + 10**9, 1),
         (None, str(START + 10_000_000), START, 2),
-        ("2030-01-01T00:00:00Z", None, None, 0),
     ],
 )
 def test_chosen_times(run: Run, start: str | None, end: str | None, first: int | None, count: int) -> None:
@@ -127,6 +126,14 @@ def test_chosen_times(run: Run, start: str | None, end: str | None, first: int |
 
     assert len(printed) == count
     assert [line["log_time"] for line in printed[:1]] == ([] if first is None else [first])
+
+
+def test_no_messages(run: Run) -> None:
+    ended = run("bag", "cat", "bag.mcap", "/imu", "--start", "2030-01-01T00:00:00Z")
+
+    warning = "Warning: there are no messages of these topics and times\n"
+    assert (ended.code, ended.out, ended.err) == (0, "", warning)
+    assert lines(run("bag", "cat", "bag.mcap", "/imu", "--limit", "0")) == []
 
 
 @pytest.mark.parametrize("time", ["yesterday", "2023-11-14", "2023-02-30T00:00:00Z", "-1", "1.5"])

@@ -419,6 +419,19 @@ def test_folders_of_an_installed_package(tmp_path: Path, monkeypatch: pytest.Mon
     assert list(source.packages) == ["a"]
 
 
+def test_installed_packages_are_read_when_they_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    write(tmp_path, {"share/a/msg/A.msg": "", "share/b/msg/B.msg": "", "share/doc/D.msg": ""})
+    (source,) = prefix_sources()
+    write(tmp_path, {"share/b/msg/C.msg": ""})
+    assert [str(each) for each in source.packages["b"]] == ["b/msg/B", "b/msg/C"]
+    assert "doc" not in source.packages
+    assert len(source.packages) == 2
+
+
 def test_everything_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     monkeypatch.setattr(sys, "prefix", str(prefix(tmp_path, "int8 a")))

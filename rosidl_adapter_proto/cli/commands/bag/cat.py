@@ -8,12 +8,13 @@ from pathlib import Path
 import click
 
 from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
+from rosidl_adapter_proto.cli.texts import show_warnings
 
 
 @click.command("cat", short_help="Print messages as JSON, one on each line.")
 @click.argument("bag", type=click.Path())
 @click.argument("topics", nargs=-1, required=True, metavar="TOPIC...", shell_complete=complete_topic)
-@fields_option("Print only these fields of the messages.")
+@fields_option
 @time_options
 @click.option("--limit", type=click.IntRange(min=0), help="Print so many messages at most.")
 @bag_source_options
@@ -34,7 +35,10 @@ def command(
     chosen = chosen_fields(fields or ())
     with open_bag(bag, include=include, distro=distro) as opened:
         messages = opened.messages(topics, start=start, end=end, fields=fields)
+        printed = False
         for recorded in islice(messages, limit):
+            printed = True
             click.echo(message_json(recorded, chosen))
-        for warning in opened.warnings:
-            click.echo(f"Warning: {warning}", err=True)
+        if not printed and limit != 0:
+            show_warnings(["there are no messages of these topics and times"])
+        show_warnings(opened.warnings)

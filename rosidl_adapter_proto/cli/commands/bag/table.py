@@ -24,7 +24,7 @@ from rosidl_adapter_proto.errors import RequestError
     type=click.Choice(["parquet", "arrow", "csv"]),
     help="What to write, where the suffix of FILE does not say.",
 )
-@fields_option("Only these fields of the messages.")
+@fields_option
 @time_options
 @bag_source_options
 def command(
