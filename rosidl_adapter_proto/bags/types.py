@@ -302,6 +302,8 @@ def _ros_type(topic: Topic) -> TypeName:
     Raises:
         BagError: It has none.
     """
+    if not _is_ros_type(topic) and topic.serialization_format != PROTOBUF:
+        raise BagError(f"its messages are {topic.serialization_format} of no ROS type: they cannot be read")
     if topic.serialization_format != PROTOBUF or "/" in topic.type_name:
         return recorded_type_name(topic.type_name)
     name = type_of_proto_name(topic.schema_name)

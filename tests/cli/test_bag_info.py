@@ -186,3 +186,21 @@ def test_protobuf_messages_of_other_programs(folder: Path, run: Run) -> None:
 
     assert ended.out.endswith("/a     google.protobuf.Timestamp  protobuf         1        nowhere\n")
     assert ended.err.startswith("Warning: topic /a (google.protobuf.Timestamp): its messages are protobuf")
+
+
+def test_messages_of_no_ros_type(folder: Path, run: Run) -> None:
+    from mcap.writer import Writer
+
+    with Path("bag.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("Place", "jsonschema", b"{}")
+        writer.add_message(writer.register_channel("/a", "json", schema), 5, b"{}", 5)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+    ended = run("bag", "info", "bag.mcap")
+
+    assert ended.out.endswith("/a     Place  json           1        nowhere\n")
+    assert (
+        ended.err == "Warning: topic /a (Place): its messages are json of no ROS type: they cannot be read\n"
+    )
