@@ -192,7 +192,8 @@ class McapReader:
         channels = self._contents.channels
         try:
             add_definition(self._contents, place.opcode, self._file.read(place.content, place.end), where)
-            for topic_id in channels.keys() - self.topics.keys():
+            unknown = channels.keys() - self.topics.keys() if len(channels) > len(self.topics) else ()
+            for topic_id in unknown:
                 raise BagError(
                     f"{self.path}: channel {topic_id} (`{channels[topic_id].topic}`) is not in the summary"
                 )

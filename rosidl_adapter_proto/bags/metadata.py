@@ -281,5 +281,6 @@ def _values(metadata: BagMetadata) -> dict[str, object]:
 def _dump(values: dict[str, object]) -> str:
     import yaml
 
-    text: str = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=2**31 - 1)
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # which takes a tenth of the time
+    text: str = yaml.dump(values, Dumper=dumper, sort_keys=False, allow_unicode=True, width=2**31 - 1)
     return text

@@ -76,7 +76,7 @@ def show_outcomes(outcomes: Sequence[BagOutcome], seconds: float) -> None:
     counts = {
         "converted": len(results) - incomplete,
         "incomplete": incomplete,
-        "were there already": sum(outcome.was_there for outcome in outcomes),
+        "already there": sum(outcome.was_there for outcome in outcomes),
         "failed": len(failed),
     }
     size = sum(result.source_size for result in results)

@@ -58,6 +58,15 @@ def test_messages_are_lines_of_json(bag: Path, run: Run) -> None:
     }
 
 
+def test_patterns_of_topics(run: Run) -> None:
+    printed = lines(run("bag", "cat", "bag.mcap", "/[it]*", "/imu"))
+
+    assert printed == lines(run("bag", "cat", "bag.mcap", "/imu", "/tf"))
+    assert run("bag", "cat", "bag.mcap", "/x*").err == (
+        "Error: bag.mcap: there is no topic /x*; there are /camera/image, /imu, /tf\n"
+    )
+
+
 def test_fields_have_the_order_of_the_definition(run: Run) -> None:
     (line,) = lines(run("bag", "cat", "bag.mcap", "/tf", "--limit", "1"))
 

@@ -55,7 +55,7 @@ def test_going_on(run: Run) -> None:
     assert without_numbers(ended.out).splitlines() == [
         "out/a.mcap: was there already",
         "out/b.mcap: 12 converted, 1 skipped; N became N",
-        "2 bags: 1 incomplete, 1 were there already; in N (N/s)",
+        "2 bags: 1 incomplete, 1 already there; in N (N/s)",
     ]
     assert ended.err.startswith("Cannot convert in/b.mcap: message 13 of /a")
     assert run("bag", "convert", "in/*", "out").code == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 import click
@@ -28,13 +28,18 @@ def command(
     include: tuple[Path, ...],
     distro: str | None,
 ) -> None:
-    """Print the messages of topics in BAG as JSON, one on each line, in the order in which they were recorded."""
+    """Print the messages of topics in BAG as JSON, one on each line, in the order in which they were recorded.
+
+    TOPIC is a name, or a pattern such as '/camera/*'.
+    """
     from rosidl_adapter_proto.bags.bag import open_bag
     from rosidl_adapter_proto.bags.message_json import chosen_fields, message_json
+    from rosidl_adapter_proto.bags.topic_names import is_named
 
     chosen = chosen_fields(fields or ())
     with open_bag(bag, include=include, distro=distro) as opened:
-        messages = opened.messages(topics, start=start, end=end, fields=fields)
+        named = ([name for name in opened.topics if is_named(name, [topic])] or [topic] for topic in topics)
+        messages = opened.messages(chain.from_iterable(named), start=start, end=end, fields=fields)
         printed = False
         for recorded in islice(messages, limit):
             printed = True
