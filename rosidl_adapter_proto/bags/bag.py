@@ -23,6 +23,7 @@ from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.time import to_nanoseconds
+from rosidl_adapter_proto.transcode.plan import chosen_names
 from rosidl_adapter_proto.transcode.records import Records
 
 if TYPE_CHECKING:
@@ -181,10 +182,8 @@ class Bag:
             SchemaError: A topic does not have one of the fields.
             TypeError: A time is none, or `fields` is one text.
         """
-        if isinstance(fields, str):
-            raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
+        chosen = chosen_names(fields)
         names = frozenset(self.topics if topics is None else self._names(topics))
-        chosen = None if fields is None else tuple(fields)
         if chosen is not None:
             for topic in self.topics.values():
                 if topic.name in names and topic.message_count:

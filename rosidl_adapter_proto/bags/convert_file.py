@@ -271,4 +271,4 @@ class _FileConversion:
         except BagError as error:
             if self._task.settings.on_error is OnError.STOP:
                 raise BagError(f"{error}, or leave it out with `--on-error skip`") from None
-            self._ledger.warnings.append(f"{error}; it is left out")
+            self._ledger.warnings.add(f"{error}; it is left out")

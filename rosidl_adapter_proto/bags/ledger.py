@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from rosidl_adapter_proto.bags.chunks import FailureInChunk
 from rosidl_adapter_proto.bags.conversion import SHOWN_FAILURES, Counts, FailedMessage, OnError, Settings
 from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 
 
@@ -30,7 +31,7 @@ class Ledger:
         self, path: str, routes: Mapping[int, TopicRoute], said: Mapping[int, int], settings: Settings
     ) -> None:
         self.failures: list[FailedMessage] = []
-        self.warnings: list[str] = []
+        self.warnings = WarningList()
         self.is_damaged = False
         self._path = path
         self._routes = routes
@@ -87,7 +88,7 @@ class Ledger:
         if self._on_error is OnError.STOP:
             raise BagError(f"{damage}{advice}")
         self.is_damaged = True
-        self.warnings.append(str(damage))
+        self.warnings.add(str(damage))
 
     def counts(self, written: Mapping[int, int]) -> dict[str, Counts]:
         """Return what became of the messages of each topic, by its name, compared with what the file says.
@@ -130,8 +131,8 @@ class Ledger:
             )
         elif missing > 0:
             counts.lost = missing
-            self.warnings.append(f"{self._path}: {missing} of the {said} messages of {name} are lost")
+            self.warnings.add(f"{self._path}: {missing} of the {said} messages of {name} are lost")
         elif missing:
-            self.warnings.append(
+            self.warnings.add(
                 f"{self._path}: it says that {name} has {said} messages, but {found} were found"
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import BinaryIO, TypeVar
 
@@ -24,6 +24,7 @@ from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPl
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
 from rosidl_adapter_proto.bags.storage import MCAP
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 
 _SALVAGE = "`bag convert --on-error skip` reads"
@@ -44,6 +45,7 @@ class McapReader:
 
     Attributes:
         profile: The profile of the file, such as `ros2`.
+        warnings: What is odd about the file; reading chunks may add what is damaged there.
         is_damaged: Whether something could not be read.
 
     Raises:
@@ -55,7 +57,7 @@ class McapReader:
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path
         self.is_damaged = False
-        self._warnings: dict[str, None] = {}
+        self.warnings = WarningList()
         self._unknown: dict[int, int] = {}  # where the first records of unknown kinds are
         self._file = McapFile(file, path)
         self._salvage = salvage
@@ -66,11 +68,6 @@ class McapReader:
         self.topics = read_topics(contents.channels, contents.schemas, contents.metadata, path)
         self.statistics = contents.statistics
         self.metadata = [(record.name, record.metadata) for record in contents.metadata]
-
-    @property
-    def warnings(self) -> Sequence[str]:
-        """What is odd about the file; there may be more of it after `chunks`, which notices what is damaged there."""
-        return list(self._warnings)
 
     def attachments(self) -> Iterator[Attachment]:
         """Yield the attachments of the file; see `StorageReader.attachments`."""
@@ -170,7 +167,7 @@ class McapReader:
         count = contents.statistics.message_count
         if damages and not self._salvage:
             raise BagError(f"{damages[0]}; {count} messages are whole, and {_SALVAGE} them") from damages[0]
-        self._warn(f"{self.path}: {why}; it was searched, and {count} messages were found")
+        self.warnings.add(f"{self.path}: {why}; it was searched, and {count} messages were found")
         for error in damages:
             self._damaged(error)
         return contents
@@ -180,10 +177,7 @@ class McapReader:
         if not self._salvage:
             raise BagError(f"{error}; {_SALVAGE} what is whole") from error
         self.is_damaged = True
-        self._warn(str(error))
-
-    def _warn(self, warning: str) -> None:
-        self._warnings[warning] = None
+        self.warnings.add(str(error))
 
     def _check(self, place: RecordPlace) -> None:
         """Compare a record with what is known of the file."""
@@ -192,7 +186,7 @@ class McapReader:
             place.opcode not in KNOWN_OPCODES
             and self._unknown.setdefault(place.opcode, place.start) == place.start
         ):
-            self._warn(f"{where}: {place.name} is left out, and so are all others of it")
+            self.warnings.add(f"{where}: {place.name} is left out, and so are all others of it")
         if place.opcode not in DEFINITIONS:
             return
         channels = self._contents.channels

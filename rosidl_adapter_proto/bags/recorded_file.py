@@ -23,8 +23,10 @@ from rosidl_adapter_proto.bags.metadata import METADATA_FILE, SERIALIZED_METADAT
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, Statistics, StoredChunk, Topic
 from rosidl_adapter_proto.bags.places import RemotePath, find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
-from rosidl_adapter_proto.bags.sqlite3_reader import JOURNAL_SUFFIXES, SqliteReader
+from rosidl_adapter_proto.bags.sqlite3_database import JOURNAL_SUFFIXES
+from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
 from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, MCAP, ROSBAG, SQLITE3, StorageReader
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import Records, pack_records
 
@@ -198,7 +200,9 @@ class _OpenedFile:
         self.metadata: Sequence[tuple[str, Mapping[str, str]]] = reader.metadata
         self.topics, self._contradictions = _with_metadata(reader, metadata)
         self._salvage = salvage
-        self._damages = {} if damage is None else {str(damage): None}
+        self._damages = WarningList()
+        if damage is not None:
+            self._damages.add(str(damage))
         metadata = metadata or self._inner_metadata(reader)
         self._messages_compressed = metadata is not None and metadata.compression_mode == "MESSAGE"
         if metadata is not None and self._messages_compressed and metadata.compression_format != ZSTD:
@@ -266,7 +270,7 @@ class _OpenedFile:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
             raise BagError(f"{reason}; `bag convert --on-error skip` leaves such messages out")
-        self._damages[reason] = None
+        self._damages.add(reason)
 
     def _inner_metadata(self, reader: StorageReader) -> BagMetadata | None:
         """Return what rosbag2 wrote into a file about its bag; the last one counts."""

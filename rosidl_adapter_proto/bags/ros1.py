@@ -27,13 +27,13 @@ from rosidl_adapter_proto.bags.model import (
 )
 from rosidl_adapter_proto.bags.ros1_records import Operation, Record, Source, read_fields
 from rosidl_adapter_proto.bags.storage import ROSBAG
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
 
 _MAGIC = b"#ROSBAG V2.0\n"
 _KEPT_FIELDS = ("md5sum", "latching")
 _MAXIMUM_TOPIC_COUNT = 2**16 - 1
-_MAXIMUM_WARNING_COUNT = 20
 _PIECE_SIZE = 2**20  # bytes of messages outside of chunks that make a chunk, about
 
 
@@ -126,7 +126,7 @@ class Ros1Reader:
     def __init__(self, file: BinaryIO, path: str, *, salvage: bool = False) -> None:
         self.path = path
         self.metadata: Sequence[tuple[str, Mapping[str, str]]] = ()
-        self.warnings: list[str] = []
+        self.warnings = WarningList()
         self.is_damaged = False
         self._file = file
         self._source = Source(path, file.seek(0, 2), self._read)
@@ -134,7 +134,9 @@ class Ros1Reader:
         index = self._read_header()
         self._tolerant = not index
         if not index:
-            self._warn(f"{path}: without an index, as its recorder did not finish; read from its beginning")
+            self.warnings.add(
+                f"{path}: without an index, as its recorder did not finish; read from its beginning"
+            )
         elif not self._read_index(index, salvage):
             index = 0
         self._tolerant |= salvage
@@ -229,12 +231,7 @@ class Ros1Reader:
         if not self._tolerant:
             raise error
         self.is_damaged = True
-        if len(self.warnings) < _MAXIMUM_WARNING_COUNT:
-            self._warn(f"{error}; {consequence}")
-
-    def _warn(self, warning: str) -> None:
-        if warning not in self.warnings:
-            self.warnings.append(warning)
+        self.warnings.add(f"{error}; {consequence}")
 
     def _read(self, start: int, size: int) -> memoryview:
         self._file.seek(start)

@@ -7,17 +7,12 @@ files in the wild mix them. Protobuf bags have a table of our own, `protobuf_des
 
 from __future__ import annotations
 
-import os
-import shutil
 import sqlite3
-import tempfile
 from array import array
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from functools import cached_property
-from pathlib import Path
 from typing import Any, TypeAlias
-from urllib.parse import quote
 
 from rosidl_adapter_proto.bags.metadata import ROSBAG2, SERIALIZED_METADATA
 from rosidl_adapter_proto.bags.model import (
@@ -31,7 +26,9 @@ from rosidl_adapter_proto.bags.model import (
     Topic,
 )
 from rosidl_adapter_proto.bags.qos import numbered_qos
+from rosidl_adapter_proto.bags.sqlite3_database import open_database, reason_of
 from rosidl_adapter_proto.bags.storage import SQLITE3
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
 
@@ -46,8 +43,6 @@ _FIRST_ROW, _LAST_ROW = -(2**63), 2**63 - 1
 _ERRORS = (sqlite3.Error, UnicodeDecodeError)  # the latter for names of columns
 _DEFINITIONS = "message_definitions"
 _DESCRIPTORS = "protobuf_descriptors"
-JOURNAL_SUFFIXES = ("-wal", "-journal")
-"""What the names of files end with that sqlite leaves beside a database if its recorder is killed."""
 
 
 class SqliteReader:
@@ -66,11 +61,14 @@ class SqliteReader:
 
     def __init__(self, file_path: str, path: str = "", *, salvage: bool = False) -> None:
         self.path = path = path or file_path
-        self.warnings: list[str] = []
-        self.is_damaged = False
+        self.warnings = WarningList()
         self._salvage = salvage
         with ExitStack() as stack:
-            self._connection = self._open(Path(file_path), stack)
+            database = open_database(file_path, path, salvage, stack)
+            self._connection = database.connection
+            if database.warning:
+                self.warnings.add(database.warning)
+            self.is_damaged = database.is_cut_off
             self._columns = {table: self._column_names(table) for table in self._tables()}
             if not {"topics", "messages"} <= self._columns.keys():
                 raise BagError(
@@ -123,61 +121,6 @@ class SqliteReader:
             yield from self._chunk(rows, done)
             done += len(rows)
 
-    def _open(self, path: Path, stack: ExitStack) -> sqlite3.Connection:
-        if not path.is_file():
-            raise BagError(f"{self.path}: no such file")
-        # Nobody writes to it: so sqlite makes no files beside it, as it would otherwise in journal mode WAL.
-        place = f"file:{quote(str(self._recovered(path, stack).absolute()))}?mode=ro&immutable=1"
-        connection = sqlite3.connect(place, uri=True, check_same_thread=False)
-        stack.callback(connection.close)
-        if self._salvage:  # else sqlite reads nothing of a file that has lost its end
-            connection.execute("PRAGMA writable_schema = ON")
-        connection.text_factory = bytes  # names may be anything; they are decoded with errors that say where
-        return connection
-
-    def _recovered(self, path: Path, stack: ExitStack) -> Path:
-        """Return the file, or a copy that has what its recorder, which was killed, had not yet written into it."""
-        path = path.resolve()  # sqlite looks beside the file that a link leads to
-        beside = [Path(f"{path}{suffix}") for suffix in JOURNAL_SUFFIXES]
-        journals = [journal for journal in beside if journal.is_file() and journal.stat().st_size]
-        if not journals:
-            return self._whole_pages(path, stack) if self._salvage else path
-        names = " and ".join(journal.name for journal in journals)
-        self.warnings.append(
-            f"{self.path}: its recorder did not finish; {names} beside it was read too, from a copy"
-        )
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-")))
-        for source in (path, *journals):
-            shutil.copyfile(source, folder / source.name)
-        connection = sqlite3.connect(folder / path.name)
-        try:
-            connection.execute(
-                "PRAGMA journal_mode = DELETE"
-            ).fetchall()  # sqlite takes in what lies beside it
-        except sqlite3.Error as error:
-            raise BagError(f"{self.path}: {_reason(error)}") from None
-        finally:
-            connection.close()
-        return folder / path.name
-
-    def _whole_pages(self, path: Path, stack: ExitStack) -> Path:
-        """Return the file, or a copy without the page in which it was cut off: sqlite would fill it up with zeros."""
-        with path.open("rb") as file:
-            head, size = file.read(18), path.stat().st_size
-            page_size = int.from_bytes(head[16:18], "big")
-            page_size = (
-                2**16 if page_size == 1 else max(page_size, 512)
-            )  # https://sqlite.org/fileformat.html#page_size
-            if size % page_size == 0:
-                return path
-            self._note(
-                f"{self.path}: cut off in the page of {page_size} bytes that is its last; it is left out"
-            )
-            copy = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="rosidl-proto-")), path.name)
-            shutil.copyfile(path, copy)
-        os.truncate(copy, size - size % page_size)
-        return copy
-
     def _query(self, query: str) -> list[tuple[Any, ...]]:
         try:
             return self._connection.execute(query).fetchall()
@@ -185,7 +128,7 @@ class SqliteReader:
             advice = (
                 "; `bag convert --on-error skip` reads what is whole" if "malformed" in str(error) else ""
             )
-            raise BagError(f"{self.path}: {_reason(error)}{advice}") from None
+            raise BagError(f"{self.path}: {reason_of(error)}{advice}") from None
 
     def _tables(self) -> list[str]:
         names = [name for (name,) in self._query("SELECT name FROM sqlite_master WHERE type = 'table'")]
@@ -300,7 +243,7 @@ class SqliteReader:
                         rows = []
                         size = 0
             except _ERRORS as error:
-                reason = _reason(error)
+                reason = reason_of(error)
             else:
                 reason = ""
             if rows:
@@ -394,8 +337,7 @@ class SqliteReader:
 
     def _note(self, warning: str) -> None:
         self.is_damaged = True
-        if warning not in self.warnings:
-            self.warnings.append(warning)
+        self.warnings.add(warning)
 
 
 def definition_names(type_name: str) -> list[str]:
@@ -427,9 +369,3 @@ def _topic(
         type_hash=type_hash,
         qos_profiles=numbered_qos(qos_profiles),
     )
-
-
-def _reason(error: Exception) -> str:
-    if "not a database" in str(error):
-        return "no sqlite3 database"
-    return f"sqlite3 says: {error}"

@@ -33,7 +33,6 @@ class StorageReader(Protocol):
         storage: The name of the storage in rosbag2, such as `mcap`.
         topics: The topics by the ids that messages in the chunks have.
         statistics: What the storage itself says of how much it has: for a file without a summary, counted.
-        attachments: The files inside it, which are few.
         metadata: Whatever else the storage keeps, by name, such as what rosbag2 and a recorder wrote about the bag.
         warnings: What is odd about the file, for people, such as that it has no summary. Reading chunks may add to it.
         is_damaged: Whether `warnings` has something that could not be read. Reading chunks may find it.
@@ -99,7 +98,7 @@ class StorageWriter(Protocol):
         """Return a chunk ready to be written: indexed and compressed. It may be called on any thread.
 
         Args:
-            records: Messages as `_core.RecordConverter` or `_core.pack_records` made them.
+            records: Messages, as `RecordConverter` or `pack_records` made them.
         """
 
     def write(self, chunk: PackedChunk) -> None:

@@ -22,6 +22,7 @@ from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.transcode.arrow import MAXIMUM_BYTES, MAXIMUM_ROWS, ColumnReader, pa
 from rosidl_adapter_proto.transcode.columns import SERIALIZATIONS
 from rosidl_adapter_proto.transcode.error import TranscodeError
+from rosidl_adapter_proto.transcode.plan import chosen_names
 from rosidl_adapter_proto.transcode.records import Records
 
 if TYPE_CHECKING:
@@ -155,8 +156,6 @@ class _Rows:
     def __init__(
         self, bag: Bag, topic: str, fields: Iterable[str] | None, maximum_rows: int, maximum_bytes: int
     ) -> None:
-        if isinstance(fields, str):
-            raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
         self._topic = topic
         limits = {"maximum_rows": maximum_rows, "maximum_bytes": maximum_bytes}
         self._readers, columns = _column_readers(bag, topic, fields, limits)
@@ -227,7 +226,7 @@ def _column_readers(
     bag: Bag, topic: str, fields: Iterable[str] | None, limits: Mapping[str, int]
 ) -> tuple[dict[tuple[str, int], ColumnReader], pa.Schema]:
     """Return what reads the messages of a topic, by file and topic id, and the columns, which all of them have."""
-    chosen = None if fields is None else tuple(fields)
+    chosen = chosen_names(fields)
     made: dict[tuple[Schema, str], ColumnReader] = {}
     readers: dict[tuple[str, int], ColumnReader] = {}
     for file in bag.files:

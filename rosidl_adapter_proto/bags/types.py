@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from rosidl_adapter_proto.bags.descriptors import descriptor_set, recorded_class
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, RecordedDefinition, Topic
+from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError, DefinitionError, MissingDefinitionError, SchemaError
 from rosidl_adapter_proto.generate.request import find_catalog
 from rosidl_adapter_proto.interfaces.catalog import Catalog, interface_base
@@ -80,7 +81,7 @@ class BagTypes:
         distro: str | None = None,
         elsewhere: Catalog | None = None,
     ) -> None:
-        self.warnings: list[str] = []
+        self.warnings = WarningList()
         self._elsewhere = elsewhere or find_catalog(include, distro)
         self._schemas: dict[Hashable, Schema] = {}
         self._topics = tuple(topics)
@@ -169,7 +170,7 @@ class BagTypes:
         origins = ", ".join(f"{each.name} from {each.origin}" for each in foreign)
         if not topic.type_hash.startswith(_KNOWN_HASH):
             if any(each.origin != ORIGIN for each in foreign):
-                self._warn(
+                self.warnings.add(
                     f"{schema.type_name}: the recording neither defines all of it nor says which version it has: "
                     f"{origins}"
                 )
@@ -177,14 +178,16 @@ class BagTypes:
             difference = f"was recorded with the type hash {topic.type_hash}, but has {schema.type_hash}"
             if foreign:
                 raise BagError(f"it {difference} with {origins}: {_ADVICE}")
-            self._warn(f"{schema.type_name} {difference} with the definition in the recording, which is used")
+            self.warnings.add(
+                f"{schema.type_name} {difference} with the definition in the recording, which is used"
+            )
 
     def _with_recorded_class(self, schema: Schema, topic: Topic) -> Schema:
         """Return a schema whose class is that of the recording: the same one, if descriptors are the same."""
         if topic.serialization_format != PROTOBUF or protobuf_definition(schema) == topic.definition:
             return schema
         if topic.definition.encoding != PROTOBUF:
-            self._warn(
+            self.warnings.add(
                 f"{schema.type_name}: the recording has no protobuf descriptor; the one that `generate` makes is used"
             )
             return schema
@@ -197,10 +200,6 @@ class BagTypes:
                 f"its protobuf descriptor does not fit its ROS definition: {what}; --include FOLDER gives another one"
             ) from None
         return recorded
-
-    def _warn(self, text: str) -> None:
-        if text not in self.warnings:
-            self.warnings.append(text)
 
     def _definitions(self, topic: Topic) -> Package:
         """Return the definitions that the recording has for a topic; none if it has none that could be read."""

@@ -82,6 +82,7 @@ class ColumnReader:
     Raises:
         SchemaError: The type has no such field, becomes too many columns, or its messages are too large.
         RequestError: The serialization format is another one.
+        TypeError: `fields` is one text.
         ValueError: `maximum_rows` or `maximum_bytes` is not positive.
     """
 

@@ -115,8 +115,6 @@ class Transcoder(_core.Transcoder):
         omit_empty_messages: bool = False,
         fields: Iterable[str] | None = None,
     ) -> None:
-        if isinstance(fields, str):
-            raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
         plan = build_plan(
             type_description, descriptor, omit_empty_messages=omit_empty_messages, fields=fields
         )

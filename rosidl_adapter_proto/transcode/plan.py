@@ -147,6 +147,17 @@ _ALL: _Paths = frozenset({()})
 _NOTHING: _Paths = frozenset()
 
 
+def chosen_names(fields: Iterable[str] | None) -> tuple[str, ...] | None:
+    """Return the names of chosen fields; None for all.
+
+    Raises:
+        TypeError: It is one text, whose letters would be taken for names.
+    """
+    if isinstance(fields, str):
+        raise TypeError(f"fields must be a list of names, such as [{fields!r}], not a text")
+    return None if fields is None else tuple(fields)
+
+
 def build_plan(
     type_description: TypeDescription,
     descriptor: Descriptor,
@@ -166,9 +177,11 @@ def build_plan(
 
     Raises:
         SchemaError: The two do not describe the same type, the type cannot be transcoded, or it has no such field.
+        TypeError: `fields` is one text.
     """
     top = type_description["type_description"]
-    chosen = _ALL if fields is None else frozenset(tuple(each.split(".")) for each in fields)
+    names = chosen_names(fields)
+    chosen = _ALL if names is None else frozenset(tuple(each.split(".")) for each in names)
     if not chosen:
         raise SchemaError(
             f"{top['type_name']}: no field is chosen; name one, or give no fields for all of them"

@@ -324,6 +324,11 @@ def test_sizes_of_record_batches() -> None:
             ColumnReader(schema_of(STRING, "test/msg/String"), **arguments)
 
 
+def test_fields_are_a_list() -> None:
+    with pytest.raises(TypeError, match=r"^fields must be a list of names, such as \['data'\], not a text$"):
+        ColumnReader(schema_of(STRING, "test/msg/String"), "data")
+
+
 def test_too_many_columns() -> None:
     types = struct_type("test/msg/D0", **{f"f{i}": "int32" for i in range(100)})
     types |= struct_type("test/msg/D1", **{f"f{i}": "test/msg/D0" for i in range(100)})
