@@ -6,7 +6,8 @@
 
 namespace rosidl_proto {
 
-struct CdrToProto {
+template <auto kMeasure, auto kWrite>
+struct ToProto {
   struct Scratch {
     explicit Scratch(const Plan&) {}
     uint64_t mark() const { return lengths.size(); }
@@ -15,26 +16,16 @@ struct CdrToProto {
 
   static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
                       Error& error) {
-    return measure_cdr_to_proto(plan, input, limit, scratch.lengths, size, error);
+    return kMeasure(plan, input, limit, scratch.lengths, size, error);
   }
   static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t mark, Output output,
                     Error& error) {
-    return write_cdr_to_proto(plan, input, scratch.lengths, mark, output, error);
+    return kWrite(plan, input, scratch.lengths, mark, output, error);
   }
 };
 
-struct Ros1ToProto {
-  using Scratch = CdrToProto::Scratch;
-
-  static bool measure(const Plan& plan, Input input, uint64_t limit, Scratch& scratch, uint64_t* size,
-                      Error& error) {
-    return measure_ros1_to_proto(plan, input, limit, scratch.lengths, size, error);
-  }
-  static bool write(const Plan& plan, Input input, Scratch& scratch, uint64_t mark, Output output,
-                    Error& error) {
-    return write_ros1_to_proto(plan, input, scratch.lengths, mark, output, error);
-  }
-};
+using CdrToProto = ToProto<measure_cdr_to_proto, write_cdr_to_proto>;
+using Ros1ToProto = ToProto<measure_ros1_to_proto, write_ros1_to_proto>;
 
 struct ProtoToCdr {
   struct Scratch {
