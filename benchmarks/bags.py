@@ -11,38 +11,24 @@ from __future__ import annotations
 
 import os
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bag_maker
 import bag_peers
 from bag_maker import IMAGE, IMU, JOINT_STATES, POINTS, SCAN, TF
 from messages import Row
+from timing import seconds
 
 from rosidl_adapter_proto import adapter_for, open_bag
 from rosidl_adapter_proto.bags.convert import convert_bag
 
-TURNS = 5
 SMALL_SECONDS = 1500
 LARGE_SECONDS = 15
 BY_HAND = 20_000
 """So many messages are converted or decoded by the slow ways; what is compared is messages per second."""
 MEMORY = Path("/dev/shm")
 COMPRESSIONS = ("", "lz4", "zstd")
-
-
-def seconds(*calls: Callable[[], object], folder: Path | None = None, turns: int = TURNS) -> list[float]:
-    """Return the time that each call takes; what it writes to a folder is removed before the next."""
-    best = [float("inf")] * len(calls)
-    for _ in range(turns):
-        for index, call in enumerate(calls):
-            start = time.perf_counter()
-            call()
-            best[index] = min(best[index], time.perf_counter() - start)
-            for written in folder.iterdir() if folder else ():
-                written.unlink()
-    return best
 
 
 def convert(source: Path, destination: Path, threads: int | None = None) -> None:

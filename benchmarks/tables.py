@@ -9,8 +9,6 @@ taking turns, and the fastest turn of each counts.
 from __future__ import annotations
 
 import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ import ptars
 from bag_maker import IMU, JOINT_STATES, SCAN, Stream, record, write_mcap
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
+from timing import seconds
 
 from rosidl_adapter_proto.bags.bag import open_bag
 from rosidl_adapter_proto.bags.convert import convert_bag
@@ -29,17 +28,6 @@ from rosidl_adapter_proto.transcode.arrow import ColumnReader
 COUNT = 10_000
 TURNS = 20
 WANTED = 5
-
-
-def seconds(*calls: Callable[[], object]) -> list[float]:
-    """Return the time that each call takes."""
-    best = [float("inf")] * len(calls)
-    for _ in range(TURNS):
-        for index, call in enumerate(calls):
-            start = time.perf_counter()
-            call()
-            best[index] = min(best[index], time.perf_counter() - start)
-    return best
 
 
 def show(work: str, against: str, ours: float, theirs: float, count: int, wanted: str = "") -> None:
@@ -92,6 +80,7 @@ def rows(folder: Path, stream: Stream) -> None:
         lambda: list(from_protobuf.record_batches(protobuf)),
         lambda: handler.list_to_record_batch(protobuf),
         lambda: handler.list_to_record_batch(list(map(bytes, transcoder.cdr_to_proto_batch(cdr)))),
+        turns=TURNS,
     )
     show(
         f"{name}, CDR to record batches",
@@ -116,6 +105,7 @@ def rows(folder: Path, stream: Stream) -> None:
         to_parquet,
         lambda: handler.list_to_record_batch(messages_of(converted)),
         lambda: data_frame(path, stream.topic),
+        turns=TURNS,
     )
     # Large messages are as fast as chunks are decompressed.
     wanted = "" if stream is SCAN else f">= {WANTED}"
