@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 
-from rosidl_adapter_proto.bags.model import CDR, PROTOBUF
+from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, message_place
 from rosidl_adapter_proto.converters import ConverterRegistry
 
 DEFAULT_FORMATS = {PROTOBUF: CDR}
@@ -116,9 +116,7 @@ class FailedMessage:
     reason: str
 
     def __str__(self) -> str:
-        return (
-            f"{self.file}: message {self.number} of {self.topic}, recorded at {self.log_time}: {self.reason}"
-        )
+        return f"{message_place(self.file, self.number, self.topic, self.log_time)}: {self.reason}"
 
 
 @dataclass(frozen=True)

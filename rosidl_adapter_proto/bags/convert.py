@@ -155,7 +155,7 @@ def convert_with(
     selected = selected_topics(dict(enumerate(topics)), settings)
     source_format, target_format = formats(list(selected.values()), settings)
     Converter(source_format, target_format, settings.registry)  # that there is none is said before all else
-    size = sum(file_size(find_place(file.path)) for file in recording.files)
+    size = recording.size
     result = ConversionResult(warnings=recording.warnings, source_size=size)
     written: list[WrittenFile] = []
     with written_aside(destination, is_folder=is_folder) as place:

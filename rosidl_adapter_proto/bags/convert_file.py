@@ -100,7 +100,7 @@ def _convert_file(task: FileTask, progress: Callable[[int, int], None]) -> FileR
             )
         wrong_labels = label_warnings(reader, selected)
         try:
-            return _FileConversion(task, reader, writer, wrong_labels).run(progress)
+            return _FileConversion(task, reader, writer, selected, wrong_labels).run(progress)
         except BagError as error:
             raise BagError("; ".join([str(error), *wrong_labels])) from error
 
@@ -133,7 +133,12 @@ class _FileConversion:
     """The conversion of one open file."""
 
     def __init__(
-        self, task: FileTask, reader: StorageReader, writer: StorageWriter, warnings: Sequence[str]
+        self,
+        task: FileTask,
+        reader: StorageReader,
+        writer: StorageWriter,
+        selected: Mapping[int, Topic],
+        warnings: Sequence[str],
     ) -> None:
         settings = task.settings
         self._task = task
@@ -142,9 +147,15 @@ class _FileConversion:
         find_types = partial(
             BagTypes, include=settings.include, distro=settings.distro, elsewhere=task.elsewhere
         )
-        self._types = find_types(selected_topics(reader.topics, settings).values())
+        self._types = find_types(selected.values())
         self._routes = plan_routes(
-            reader.topics, reader.statistics, settings, task.target_format, self._types, find_types(())
+            reader.topics,
+            selected,
+            reader.statistics,
+            settings.on_error,
+            task.target_format,
+            self._types,
+            find_types(()),
         )
         self._failed_ids = self._reserve_failed_ids()
         self._ledger = Ledger(reader.path, self._routes, reader.statistics.message_counts, settings)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from rosidl_adapter_proto.bags.bag import Bag, BagTopic
 from rosidl_adapter_proto.bags.labels import label_warnings
-from rosidl_adapter_proto.bags.places import file_size, find_place
 from rosidl_adapter_proto.errors import BagError
 
 MISSING = "nowhere"
@@ -81,7 +80,7 @@ def bag_information(bag: Bag) -> BagInformation:
         files=[file.path for file in bag.files],
         storage=sorted({file.storage for file in bag.files}),
         compression=[each for each in compressions if each],
-        size=sum(file_size(find_place(file.path)) for file in bag.files),
+        size=bag.recording.size,
         start_time=bag.start_time,
         end_time=bag.end_time,
         message_count=bag.message_count,

@@ -19,7 +19,7 @@ from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 
 from rosidl_adapter_proto.bags.model import Attachment, StoredChunk
-from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE
+from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, MAXIMUM_CHUNK_SIZE
 from rosidl_adapter_proto.errors import BagError
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ class McapFile:
         Args:
             first: The first of them.
         """
-        piece = self.read(first.start, max(first.end, min(first.start + PIECE_SIZE, self.size)))
+        piece = self.read(first.start, max(first.end, min(first.start + CHUNK_SIZE, self.size)))
         position, count, start_time, end_time = 0, 0, 2**64 - 1, 0
         while position + MESSAGE_HEAD.size <= len(piece):
             opcode, length, _, _, log_time, _ = MESSAGE_HEAD.unpack_from(piece, position)

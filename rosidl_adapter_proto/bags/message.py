@@ -11,7 +11,7 @@ from typing import Any
 from google.protobuf.message import Message
 
 from rosidl_adapter_proto.bags.decoding import Decode
-from rosidl_adapter_proto.bags.model import Topic
+from rosidl_adapter_proto.bags.model import Topic, message_place
 from rosidl_adapter_proto.errors import BagError, ConversionError
 
 
@@ -81,8 +81,8 @@ class BagMessage:
             try:
                 self._message = decode(self.data)
             except ConversionError as error:
-                which = f"message {self._number} of {self.topic}, recorded at {self.log_time}"
-                raise BagError(f"{self._source.path}: {which}: {error}") from error
+                place = message_place(self._source.path, self._number, self.topic, self.log_time)
+                raise BagError(f"{place}: {error}") from error
         return self._message
 
     def __iter__(self) -> Iterator[Any]:

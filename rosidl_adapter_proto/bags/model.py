@@ -59,6 +59,18 @@ class Topic:
     metadata: Mapping[str, str] = field(default_factory=dict, repr=False)
 
 
+def message_place(path: str, number: int, topic: str, log_time: int) -> str:
+    """Return where a message is, for people.
+
+    Args:
+        path: The file.
+        number: Which message of the topic it is; the first one is 1.
+        topic: The name of the topic.
+        log_time: When it was recorded, in nanoseconds since 1970.
+    """
+    return f"{path}: message {number} of {topic}, recorded at {log_time}"
+
+
 @dataclass(frozen=True)
 class Attachment:
     """A file inside a recording (https://mcap.dev/spec#attachment-op0x09)."""

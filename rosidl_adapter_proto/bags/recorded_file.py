@@ -25,7 +25,14 @@ from rosidl_adapter_proto.bags.places import RemotePath, find_place, local_copy
 from rosidl_adapter_proto.bags.ros1 import Ros1Reader
 from rosidl_adapter_proto.bags.sqlite3_database import JOURNAL_SUFFIXES
 from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
-from rosidl_adapter_proto.bags.storage import MAXIMUM_CHUNK_SIZE, MCAP, ROSBAG, SQLITE3, StorageReader
+from rosidl_adapter_proto.bags.storage import (
+    CHUNK_SIZE,
+    MAXIMUM_CHUNK_SIZE,
+    MCAP,
+    ROSBAG,
+    SQLITE3,
+    StorageReader,
+)
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import Records, pack_records
@@ -35,7 +42,6 @@ ZSTD_SUFFIX = ".zstd"
 _MAGICS = {MAGIC: MCAP, b"SQLite format 3\0": SQLITE3, b"#ROSBAG V": ROSBAG}
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _SPARE_SPACE = 2**26  # bytes that stay free on the disk of temporary files
-_PIECE_SIZE = 2**20  # bytes of decompressed messages in a chunk, about
 _SHARED_FIELDS = {
     "type_name": "type",
     "serialization_format": "serialization format",
@@ -233,7 +239,7 @@ class _OpenedFile:
             if self._messages_compressed:
                 # In the order of time, pieces of a chunk would have to stand between those of others.
                 yield from self._with_plain_messages(
-                    chunk, selection, MAXIMUM_CHUNK_SIZE if in_time_order else _PIECE_SIZE
+                    chunk, selection, MAXIMUM_CHUNK_SIZE if in_time_order else CHUNK_SIZE
                 )
             else:
                 yield chunk

@@ -56,6 +56,11 @@ class Recording:
             f"{self.path}: {METADATA_FILE} says {metadata.message_count} messages, but its files have {message_count}"
         ]
 
+    @property
+    def size(self) -> int:
+        """How many bytes its files have, as they are stored."""
+        return sum(file_size(find_place(file.path)) for file in self.files)
+
     def open(self, index: int, salvage: bool = False) -> StorageReader:
         """Open a file.
 

@@ -26,7 +26,7 @@ from rosidl_adapter_proto.bags.model import (
     Topic,
 )
 from rosidl_adapter_proto.bags.ros1_records import Operation, Record, Source, read_fields
-from rosidl_adapter_proto.bags.storage import ROSBAG
+from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, ROSBAG
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
@@ -34,7 +34,6 @@ from rosidl_adapter_proto.transcode.records import pack_records
 _MAGIC = b"#ROSBAG V2.0\n"
 _KEPT_FIELDS = ("md5sum", "latching")
 _MAXIMUM_TOPIC_COUNT = 2**16 - 1
-_PIECE_SIZE = 2**20  # bytes of messages outside of chunks that make a chunk, about
 
 
 @dataclass
@@ -170,7 +169,7 @@ class Ros1Reader:
             if record.operation == Operation.CHUNK and self._selected(record.place, selection):
                 yield from self._chunk(record)
         if self._contents.loose_start is not None:
-            yield from self._loose_chunks(_PIECE_SIZE)
+            yield from self._loose_chunks(CHUNK_SIZE)
 
     def _chunks_in_time_order(self, selection: Selection) -> Iterator[StoredChunk]:
         starts = {place: times[0] for place, times in self._contents.chunk_times.items()}

@@ -88,8 +88,9 @@ def formats(topics: Sequence[Topic], settings: Settings) -> tuple[str, str]:
 
 def plan_routes(
     topics: Mapping[int, Topic],
+    selected: Mapping[int, Topic],
     statistics: Statistics,
-    settings: Settings,
+    on_error: OnError,
     target_format: str,
     types: BagTypes,
     elsewhere: BagTypes,
@@ -98,8 +99,9 @@ def plan_routes(
 
     Args:
         topics: All topics of the file.
+        selected: Those that are to be converted (`selected_topics`).
         statistics: How many messages they have: nothing need be known of the type of a topic without any.
-        settings: How to convert.
+        on_error: What becomes of those that cannot be converted.
         target_format: What to convert to.
         types: The types of the topics.
         elsewhere: The types that are found where the bag is not, of which those of ROS 2 are for topics of ROS 1.
@@ -107,7 +109,6 @@ def plan_routes(
     Raises:
         BagError: Nothing is known of the type of a topic that has messages.
     """
-    selected = selected_topics(topics, settings)
     routes = {topic_id: TopicRoute(topic, Fate.NOT_SELECTED) for topic_id, topic in topics.items()}
     for topic_id, topic in selected.items():
         if topic.serialization_format == target_format:
@@ -118,9 +119,9 @@ def plan_routes(
         except (BagError, ConverterError) as error:
             if not statistics.message_counts.get(topic_id):
                 routes[topic_id] = TopicRoute(topic, Fate.COPIED, _without_definition(topic, target_format))
-            elif settings.on_error is OnError.STOP:
+            elif on_error is OnError.STOP:
                 raise
-            elif settings.on_error is OnError.COPY:
+            elif on_error is OnError.COPY:
                 routes[topic_id] = TopicRoute(topic, Fate.COPIED, topic, reason=str(error))
             else:
                 routes[topic_id] = TopicRoute(topic, Fate.SKIPPED, reason=str(error))

@@ -27,13 +27,10 @@ from rosidl_adapter_proto.bags.model import (
 )
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.bags.sqlite3_database import open_database, reason_of
-from rosidl_adapter_proto.bags.storage import SQLITE3
+from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, SQLITE3
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
-
-CHUNK_SIZE = 2**20
-"""About how many bytes of messages make a chunk."""
 
 _Row: TypeAlias = tuple[Any, ...]  # a row of messages: id, topic_id, timestamp and data, of whatever type
 

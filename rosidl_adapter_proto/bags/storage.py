@@ -21,6 +21,9 @@ SUFFIXES: Mapping[str, str] = {".mcap": MCAP, ".db3": SQLITE3, ".bag": ROSBAG}
 WRITTEN_SUFFIXES: Mapping[str, str] = {MCAP: ".mcap", SQLITE3: ".db3"}
 """What the names of files end with, by the storages that are written."""
 
+CHUNK_SIZE = 2**20
+"""About how many bytes of messages make a chunk, where the storage has none."""
+
 MAXIMUM_CHUNK_SIZE = 2**32 - 1
 """The largest chunk that is read, in bytes: what a file says is not believed before memory is taken for it."""
 

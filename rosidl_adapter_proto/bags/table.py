@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.bag import Bag, open_bag
-from rosidl_adapter_proto.bags.model import Topic
+from rosidl_adapter_proto.bags.model import Topic, message_place
 from rosidl_adapter_proto.bags.order import Run
 from rosidl_adapter_proto.bags.output import check_new, written_aside
 from rosidl_adapter_proto.bags.places import find_place, written_locally
@@ -205,9 +205,8 @@ class _Rows:
                 index = error.batch_index or 0
                 error.batch_index = None
                 number = self._count + index - start + 1
-                raise BagError(
-                    f"{path}: message {number} of {self._topic}, recorded at {log_times[index]}: {error}"
-                ) from error
+                place = message_place(path, number, self._topic, log_times[index])
+                raise BagError(f"{place}: {error}") from error
             self._log_times += log_times[start:stop].cast("B")
             self._publish_times += publish_times[start:stop].cast("B")
             self._count += stop - start

@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rosidl_adapter_proto.bags.model import RecordedDefinition, Selection, Topic
-from rosidl_adapter_proto.bags.sqlite3_reader import CHUNK_SIZE, SqliteReader
+from rosidl_adapter_proto.bags.sqlite3_reader import SqliteReader
+from rosidl_adapter_proto.bags.storage import CHUNK_SIZE
 from rosidl_adapter_proto.errors import BagError
 from tests.bags.databases import QOS, ROWS, STRING_HASH, Row, database, rows_of
 

@@ -37,11 +37,8 @@ uint32 nanosec
 
 
 @pytest.fixture(autouse=True)
-def no_ros(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def no_ros(folder: Path) -> None:
     """Hide what is installed, whatever that is."""
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    monkeypatch.delenv("ROS_DISTRO", raising=False)
-    monkeypatch.setattr("sys.prefix", str(tmp_path))
 
 
 def topic(text: str | None = None, type_name: str = "my_msgs/msg/Track", **values: Any) -> Topic:
