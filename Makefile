@@ -26,7 +26,7 @@ BUILD_IN := --config-settings=build-dir=build/environment
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet $(BUILD_IN)$(VENV) --editable '.[ros,test,test-peers,docs]' $(KILTED_TEST_PACKAGES)
+	$(BIN)/pip install --quiet $(BUILD_IN)$(VENV) --editable '.[ros,test,test-peers,test-plotjuggler,plotjuggler,plot,docs]' $(KILTED_TEST_PACKAGES)
 	touch $@
 
 $(JAZZY)/ready: pyproject.toml
@@ -84,8 +84,10 @@ test-kilted: $(VENV)/ready
 	$(BIN)/python -m pytest --cov --cov-report=term:skip-covered
 
 # Projects that pip builds have environments of their own, the same ones as above; the peers need a newer protobuf.
+# Plugins are the same files in both.
 test-jazzy: $(JAZZY)/ready
-	$(JAZZY)/bin/python -m pytest --ignore=tests/hooks/test_backends.py --ignore=tests/bags/peers
+	$(JAZZY)/bin/python -m pytest --ignore=tests/hooks/test_backends.py --ignore=tests/bags/peers \
+	  --ignore=tests/plotjuggler
 
 test-colcon: $(COLCON)/ready
 	$(COLCON)/bin/pip install --quiet $(BUILD_IN)$(COLCON) --no-deps .

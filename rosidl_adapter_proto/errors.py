@@ -40,6 +40,10 @@ class BagError(Error):
     """A bag cannot be read, converted or written."""
 
 
+class PluginError(Error):
+    """A WebAssembly plugin cannot be built or read, breaks its contract, or fails while it runs."""
+
+
 class PlaceError(Error):
     """A place on another machine, or a process, failed while a bag was read or written: another try may go well.
 

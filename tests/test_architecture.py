@@ -18,8 +18,9 @@ FLOORS = {
     "ros": 5,
     "converters": 5,
     "bags": 6,
-    "hooks": 7,
-    "cli": 8,
+    "plotjuggler": 7,
+    "hooks": 8,
+    "cli": 9,
     "time": 1,
     "errors": 0,
 }
