@@ -214,6 +214,7 @@ def test_every_command_is_listed(run: Run) -> None:
         "hook",
         "list",
         "lock",
+        "plotjuggler",
         "show",
     ]
 
