@@ -13,16 +13,13 @@ constexpr const char* kWrongNotes = "the notes are not those of the plan";
 
 constexpr uint64_t kLongestIndex = 12;  // [4294967295]
 
-bool is_map_key(const Operation& op) {
-  return op.shape == Shape::Single && visit(op.cdr, [](auto form) {
-           const BuiltinType type = builtin_type(form);
-           return decltype(form)::kIsNumber ? type != BuiltinType::Float32 && type != BuiltinType::Float64
-                                            : std::is_same_v<decltype(form), Form<CdrForm::String>>;
-         });
-}
-
 bool is_number(CdrForm form) {
   return visit(form, [](auto each) { return decltype(each)::kIsNumber; });
+}
+
+bool is_map_key(const Operation& op) {
+  const bool integer = is_number(op.cdr) && module_kind(builtin_type(op.cdr)) != ModuleKind::Float64;
+  return op.shape == Shape::Single && (integer || op.cdr == CdrForm::String);
 }
 
 }  // namespace

@@ -65,11 +65,6 @@ constexpr BuiltinType builtin_type(CdrForm form) {
   return BuiltinType::String;
 }
 
-template <CdrForm form>
-constexpr BuiltinType builtin_type(Form<form>) {
-  return builtin_type(form);
-}
-
 constexpr bool is_signed(BuiltinType type) { return type >= BuiltinType::Int8 && type <= BuiltinType::Int64; }
 
 // The kinds of values in the module format.
@@ -81,21 +76,32 @@ constexpr ModuleKind module_kind(BuiltinType type) {
   return is_signed(type) ? ModuleKind::Int64 : ModuleKind::Uint64;
 }
 
-// A number of a type as 64 bits: of an integer its value, of a floating-point number the bits of a double.
-template <BuiltinType type, class Raw>
-uint64_t widened(Raw raw) {
-  if constexpr (type == BuiltinType::Float32) {
-    float number;
-    std::memcpy(&number, &raw, sizeof number);
-    const double wide = number;
-    uint64_t bits;
-    std::memcpy(&bits, &wide, sizeof bits);
-    return bits;
-  } else if constexpr (is_signed(type)) {
-    return static_cast<uint64_t>(int64_t{static_cast<std::make_signed_t<Raw>>(raw)});
-  } else {
-    return raw;
-  }
+// What numbers of a form are, and their size. They are handed over as their bits in CDR, without a sign.
+struct NumberType {
+  BuiltinType type;
+  uint8_t size;
+};
+
+template <CdrForm form>
+constexpr NumberType number_type(Form<form>) {
+  return {builtin_type(form), sizeof(typename Form<form>::Raw)};
+}
+
+// The value of an integer with its sign.
+inline int64_t signed_value(NumberType type, uint64_t raw) {
+  const int above = 64 - 8 * type.size;
+  return is_signed(type.type) ? static_cast<int64_t>(raw << above) >> above : static_cast<int64_t>(raw);
+}
+
+// As modules have it: of an integer its value, of a floating-point number the bits of a double.
+inline uint64_t wide_value(NumberType type, uint64_t raw) {
+  if (type.type != BuiltinType::Float32) return static_cast<uint64_t>(signed_value(type, raw));
+  float number;
+  const auto bits = static_cast<uint32_t>(raw);
+  std::memcpy(&number, &bits, sizeof number);
+  const double wide = number;
+  std::memcpy(&raw, &wide, sizeof raw);
+  return raw;
 }
 
 // Copies are made in whole words, so behind what is read there are kSpill more bytes.
@@ -148,16 +154,18 @@ class FlatPairs {
   }
 
   // A key is a path and what follows it.
-  template <BuiltinType type, class Raw>
-  ROSIDL_PROTO_INLINE At number(At at, Text path, Text last, Raw raw) {
+  ROSIDL_PROTO_NO_INLINE At number(At at, Text path, Text last, NumberType type, uint64_t raw) {
     if (format_ == FlatFormat::Module)
-      return module_number(at, path, last, module_kind(type), widened<type>(raw));
-    constexpr bool boolean = type == BuiltinType::Bool;
-    const BuiltinType shown = boolean && format_ == FlatFormat::Page ? BuiltinType::Uint8 : type;
-    uint8_t* const value = pair(at, path, last, shown, sizeof(Raw));
+      return module_number(at, path, last, module_kind(type.type), wide_value(type, raw));
+    const bool page_boolean = type.type == BuiltinType::Bool && format_ == FlatFormat::Page;
+    uint8_t* const value = pair(at, path, last, page_boolean ? BuiltinType::Uint8 : type.type, type.size);
     if (value == nullptr) return at;
-    store_little(value, raw);
-    return value + sizeof(Raw);
+    if (left(value) >= sizeof raw) {
+      store_little(value, raw);  // what is too much is written over
+    } else {
+      std::memcpy(value, &raw, type.size);
+    }
+    return value + type.size;
   }
 
   At string(At at, Text path, Text last, Text text) {
@@ -216,7 +224,7 @@ class FlatPairs {
   }
 
   // Writes all of a pair but the value, which takes `size` bytes; returns its place, or nullptr.
-  ROSIDL_PROTO_NO_INLINE uint8_t* pair(At at, Text path, Text last, BuiltinType type, uint64_t size) {
+  uint8_t* pair(At at, Text path, Text last, BuiltinType type, uint64_t size) {
     const uint64_t key = path.size + last.size, needed = size_bytes() + key + 1 + size;
     if (left(at) < needed) return close(at), nullptr;
     ++count_;
@@ -255,7 +263,7 @@ class FlatPairs {
     return at + kModuleEntry;
   }
 
-  ROSIDL_PROTO_NO_INLINE At module_number(At at, Text path, Text last, ModuleKind kind, uint64_t bits) {
+  At module_number(At at, Text path, Text last, ModuleKind kind, uint64_t bits) {
     const uint64_t size = value_size(kind);
     uint8_t* const value = module_pair(at, path, last, kind, size);
     if (value == nullptr) return at;

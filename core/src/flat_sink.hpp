@@ -20,12 +20,12 @@ inline uint8_t* put_decimal(uint8_t* out, uint64_t number) {
 // The text of an integer or boolean. It points to itself, so it stays where it is.
 class Decimal {
  public:
-  template <BuiltinType type>
-  Text of(uint64_t widened) {
-    if (type == BuiltinType::Bool) return of_literal(widened != 0 ? "true" : "false");
-    const bool negative = is_signed(type) && static_cast<int64_t>(widened) < 0;
+  Text of(NumberType type, uint64_t raw) {
+    if (type.type == BuiltinType::Bool) return of_literal(raw != 0 ? "true" : "false");
+    const bool negative = is_signed(type.type) && signed_value(type, raw) < 0;
+    const auto value = static_cast<uint64_t>(signed_value(type, raw));
     text_[0] = '-';
-    const uint8_t* const end = put_decimal(text_ + negative, negative ? 0 - widened : widened);
+    const uint8_t* const end = put_decimal(text_ + negative, negative ? 0 - value : value);
     return {text_, static_cast<uint64_t>(end - text_)};
   }
 
@@ -75,28 +75,22 @@ class FlatSink : public Stop {
 
   template <class F>
   ROSIDL_PROTO_INLINE At number(const Operation& op, At at, typename F::Raw raw) {
-    const FlatField& field = field_of(op);
-    if (field.names != nullptr || field.map_key) return noted_number<F>(field, at, raw);
-    return pairs_.number<builtin_type(F{})>(at, path(), name(field), raw);
+    return value(op, at, number_type(F{}), raw);
   }
 
   template <class F, class Numbers>
   At numbers(const Operation& op, At at, const Numbers& numbers) {
-    const FlatField& field = field_of(op);
+    constexpr NumberType type = number_type(F{});
     const uint64_t count = numbers.count();
-    uint32_t offset;
-    if (count > set_.policy.maximum && is_bytes<F> && find_bytes(numbers.bytes(), count, &offset))
-      return pairs_.blob(at, path(), name(field), offset, static_cast<uint32_t>(count));
-    const uint64_t outside = set_.path_size;
-    push(name(field));
+    const uint8_t* const bytes = numbers.bytes();
+    if (bytes != nullptr || numbers.absent()) return values_together(op, at, type, bytes, count);
+    const uint64_t outside = enter(op), shown = shown_of(count);
     uint64_t index = 0;
-    const bool good = each<F>(numbers, shown_of(count), [&](typename F::Raw raw) {
-      Decimal decimal;
-      const Text last = decimal.of_index(index++);
-      at = field.names != nullptr ? enumerator<F>(field, at, last, raw)
-                                  : pairs_.number<builtin_type(F{})>(at, path(), last, raw);
+    const bool good = numbers.each([&](typename F::Raw raw) {
+      if (index < shown) at = element(op, at, index++, type, raw);
+      return true;
     });
-    set_.path_size = outside;
+    leave(outside);
     return good ? at : nullptr;
   }
 
@@ -109,30 +103,27 @@ class FlatSink : public Stop {
   At string(const Operation& op, At at, int64_t element, Text text) {
     const FlatField& field = field_of(op);
     if (field.map_key) return push({text.data, cut_size(text, kMaximumMapKey)}), at;
-    return element_of(field, at, element, [&](Text last) { return pairs_.string(at, path(), last, text); });
+    return element_of(op, at, element, [&](Text last) { return pairs_.string(at, path(), last, text); });
   }
 
   template <class Units>
   At wstring(const Operation& op, At at, int64_t element, const Units& units) {
-    const FlatField& field = field_of(op);
-    return element_of(field, at, element, [&](Text last) { return pairs_.wstring(at, path(), last, units); });
+    return element_of(op, at, element, [&](Text last) { return pairs_.wstring(at, path(), last, units); });
   }
 
   Nested begin(const Operation& op, At at, int64_t element) {
-    const FlatField& field = field_of(op);
     const bool hidden = element != kNoElement && static_cast<uint64_t>(element) >= shown_;
-    const Nested nested{at, set_.path_size, shown_, hidden ? pairs_.close(at) : nullptr};
-    push(name(field));
-    if (field.indexed && !hidden) {
+    const Nested nested{at, enter(op), shown_, hidden ? pairs_.close(at) : nullptr};
+    if (field_of(op).indexed && !hidden) {
       Decimal decimal;
       push(decimal.of_index(static_cast<uint64_t>(element)));
     }
-    push_slash();
+    set_.path[set_.path_size++] = '/';
     return nested;
   }
 
   At end(const Operation&, At, const Nested& nested, At inner) {
-    set_.path_size = nested.path_size;
+    leave(nested.path_size);
     shown_ = nested.shown;
     if (nested.room != nullptr) pairs_.open(nested.room);
     return inner;
@@ -141,10 +132,6 @@ class FlatSink : public Stop {
   bool finish(At) { return true; }
 
  private:
-  template <class F>
-  static constexpr bool is_bytes =
-      std::is_same_v<F, Form<CdrForm::Uint8>> || std::is_same_v<F, Form<CdrForm::Int8>>;
-
   const FlatField& field_of(const Operation& op) const { return set_.fields[&op - set_.operations]; }
   Text name(const FlatField& field) const { return {set_.names + field.name.place, field.name.size}; }
   Text path() const { return {set_.path, set_.path_size}; }
@@ -153,7 +140,13 @@ class FlatSink : public Stop {
     copy_exactly(set_.path + set_.path_size, text.data, text.size);
     set_.path_size += text.size;
   }
-  void push_slash() { set_.path[set_.path_size++] = '/'; }
+  // Appends the name of a field to the path; returns what `leave` needs.
+  uint64_t enter(const Operation& op) {
+    const uint64_t outside = set_.path_size;
+    push(name(field_of(op)));
+    return outside;
+  }
+  void leave(uint64_t outside) { set_.path_size = outside; }
 
   // How many elements of an array or sequence are shown.
   uint64_t shown_of(uint64_t count) const {
@@ -170,61 +163,76 @@ class FlatSink : public Stop {
            count <= set_.message.size - before && before + count <= UINT32_MAX;
   }
 
-  // Calls `show(raw)` for the first `shown` numbers; false if the others cannot be read.
-  template <class F, class Numbers, class Show>
-  static bool each(const Numbers& numbers, uint64_t shown, Show show) {
-    using Raw = typename F::Raw;
-    if (numbers.absent()) {
-      for (uint64_t i = 0; i < shown; ++i) show(Raw{0});
-    } else if (const uint8_t* const bytes = numbers.bytes()) {
-      for (uint64_t i = 0; i < shown; ++i) show(load_little<Raw>(bytes + i * sizeof(Raw)));
-    } else {
-      return numbers.each([&](Raw raw) {
-        if (shown != 0) --shown, show(raw);
-        return true;
-      });
-    }
-    return true;
-  }
-
   // Calls `show(last)`, where `last` is what follows the path in the key of a field or of an element.
   template <class Show>
-  At element_of(const FlatField& field, At at, int64_t element, Show show) {
-    if (element == kNoElement) return show(name(field));
+  At element_of(const Operation& op, At at, int64_t element, Show show) {
+    if (element == kNoElement) return show(name(field_of(op)));
     if (static_cast<uint64_t>(element) >= shown_) return at;
-    const uint64_t outside = set_.path_size;
-    push(name(field));
+    const uint64_t outside = enter(op);
     Decimal decimal;
     at = show(decimal.of_index(static_cast<uint64_t>(element)));
-    set_.path_size = outside;
+    leave(outside);
     return at;
   }
 
-  template <class F>
-  ROSIDL_PROTO_NO_INLINE At noted_number(const FlatField& field, At at, typename F::Raw raw) {
-    if (!field.map_key) return enumerator<F>(field, at, name(field), raw);
+  // A number alone: a value, or a key of the map.
+  ROSIDL_PROTO_NO_INLINE At value(const Operation& op, At at, NumberType type, uint64_t raw) {
+    const FlatField& field = field_of(op);
+    if (!field.map_key) return named_or_number(field, at, name(field), type, raw);
     Decimal decimal;
-    push(decimal.of<builtin_type(F{})>(widened<builtin_type(F{})>(raw)));
+    push(decimal.of(type, raw));
     return at;
   }
 
-  // A value of an enumeration: its name, or its number if it has none.
-  template <class F>
-  ROSIDL_PROTO_NO_INLINE At enumerator(const FlatField& field, At at, Text last, typename F::Raw raw) {
+  // A number of several, the path of which is entered.
+  ROSIDL_PROTO_NO_INLINE At element(const Operation& op, At at, uint64_t index, NumberType type,
+                                    uint64_t raw) {
+    Decimal decimal;
+    return named_or_number(field_of(op), at, decimal.of_index(index), type, raw);
+  }
+
+  // Numbers that lie together, or that are all zero if there are no bytes.
+  ROSIDL_PROTO_NO_INLINE At values_together(const Operation& op, At at, NumberType type, const uint8_t* bytes,
+                                            uint64_t count) {
+    uint32_t offset;
+    const bool blob = op.cdr == CdrForm::Uint8 || op.cdr == CdrForm::Int8;
+    if (blob && count > set_.policy.maximum && find_bytes(bytes, count, &offset))
+      return pairs_.blob(at, path(), name(field_of(op)), offset, static_cast<uint32_t>(count));
+    const uint64_t outside = enter(op), shown = shown_of(count);
+    for (uint64_t i = 0; i < shown; ++i) {
+      at = element(op, at, i, type, bytes == nullptr ? 0 : load_raw(bytes + i * type.size, type.size));
+    }
+    leave(outside);
+    return at;
+  }
+
+  static uint64_t load_raw(const uint8_t* p, uint8_t size) {
+    switch (size) {
+      case 1:
+        return *p;
+      case 2:
+        return load_little<uint16_t>(p);
+      case 4:
+        return load_little<uint32_t>(p);
+      default:
+        return load_little<uint64_t>(p);
+    }
+  }
+
+  // A value of an enumeration is shown by its name, if it has one.
+  At named_or_number(const FlatField& field, At at, Text last, NumberType type, uint64_t raw) {
+    if (field.names == nullptr) return pairs_.number(at, path(), last, type, raw);
     using Value = FlatNote::EnumValue;
-    constexpr BuiltinType type = builtin_type(F{});
-    const uint64_t bits = widened<type>(raw);
-    const auto number = static_cast<int64_t>(bits);
-    const std::vector<Value>& values = *field.names;
+    const int64_t number = signed_value(type, raw);
     const auto found =
-        std::lower_bound(values.begin(), values.end(), number,
+        std::lower_bound(field.names->begin(), field.names->end(), number,
                          [](const Value& each, int64_t wanted) { return each.number < wanted; });
-    if (found != values.end() && found->number == number) {
+    if (found != field.names->end() && found->number == number) {
       const auto* const data = reinterpret_cast<const uint8_t*>(found->name.data());
       return pairs_.string(at, path(), last, {data, found->name.size()});
     }
     Decimal decimal;
-    return pairs_.string(at, path(), last, decimal.of<type>(bits));
+    return pairs_.string(at, path(), last, decimal.of(type, raw));
   }
 
   Setting set_;
