@@ -41,7 +41,7 @@ class Decimal {
     return {reinterpret_cast<const uint8_t*>(literal), std::strlen(literal)};
   }
 
-  uint8_t text_[24 + kSpill] = {};  // of 64 bits there are at most 20 digits
+  uint8_t text_[24 + kSpill];  // of 64 bits there are at most 20 digits
 };
 
 class FlatSink : public Stop {
