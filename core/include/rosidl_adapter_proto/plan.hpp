@@ -16,6 +16,10 @@ namespace rosidl_proto {
 // The version of packed plans, which is a digit in them: VERSION in plan.py.
 constexpr int kPlanVersion = 2;
 
+// How a packed plan begins, and the sizes of its parts.
+constexpr char kPlanMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
+constexpr size_t kPlanHeaderBytes = 20, kPlanMessageBytes = 24, kPlanOperationBytes = 40;
+
 // Deeper nesting is refused. Plans cannot recur, so this bounds the stack for every input.
 constexpr uint32_t kMaximumDepth = 100;
 
