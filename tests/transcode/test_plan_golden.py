@@ -11,10 +11,12 @@ from typing import Any
 
 import pytest
 from google.protobuf.descriptor import FieldDescriptor
+from protobuf_types import descriptor_of, general_file
 from ros_types import describe, nasty_types, protobuf_class, struct_type
 
 from rosidl_adapter_proto.interfaces.scalars import SCALARS, CdrForm
 from rosidl_adapter_proto.transcode.plan import UNBOUNDED, VERSION, Operation, Plan, build_plan
+from rosidl_adapter_proto.transcode.protobuf_plan import NATURAL_FORMS, protobuf_plan
 
 FOLDER = Path(__file__).parents[1] / "golden" / "plans"
 TYPES = {
@@ -28,6 +30,10 @@ PLANS: dict[str, tuple[str, dict[str, Any]]] = {
     "image": ("test/msg/Image", {"omit_empty_messages": True}),
     "chosen_fields": ("test/msg/Image", {"fields": ["header.stamp.nanosec", "width"]}),
 }
+
+
+GENERAL = "general"
+"""The plan of a message that does not come from ROS."""
 
 
 def bound(number: int) -> str:
@@ -64,6 +70,9 @@ def forms() -> str:
     for scalar in SCALARS.values():
         if scalar.cdr is not None:
             facts.setdefault(scalar.cdr, set()).add((scalar.protobuf, scalar.many, scalar.largest_character))
+    for protobuf, (_, form) in NATURAL_FORMS.items():
+        if protobuf != "enum":  # which is an int32 on the wire
+            facts.setdefault(form, set()).add((protobuf, protobuf, 0))
     text = ""
     for form in CdrForm:
         ((one, many, largest_character),) = facts[form]
@@ -73,6 +82,9 @@ def forms() -> str:
 
 
 def plan_of(name: str) -> Plan:
+    if name == GENERAL:
+        plan, _ = protobuf_plan(descriptor_of([general_file()], "test.General"))
+        return plan
     type_name, options = PLANS[name]
     message_class = protobuf_class(TYPES, type_name, hashed=name == "image")
     return build_plan(describe(TYPES, type_name), message_class.DESCRIPTOR, **options)
@@ -86,7 +98,7 @@ def compare(name: str, text: str, request: pytest.FixtureRequest) -> None:
     assert text == file.read_text(encoding="utf-8"), f"{file}: if it is meant, run: make golden"
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", [*PLANS, GENERAL])
 def test_golden_plan(name: str, request: pytest.FixtureRequest) -> None:
     compare(name, golden(plan_of(name)), request)
 
@@ -95,10 +107,12 @@ def test_forms(request: pytest.FixtureRequest) -> None:
     compare("forms", forms(), request)
 
 
-def test_one_plan_has_every_form() -> None:
-    plan = plan_of("every_form")
-    assert {each.cdr for message in plan.messages for each in message.operations} == set(CdrForm)
+def test_plans_have_every_form() -> None:
+    plans = plan_of("every_form"), plan_of(GENERAL)
+    found = [{each.cdr for message in plan.messages for each in message.operations} for plan in plans]
+    assert found[0] == {each for each in CdrForm if each <= CdrForm.MESSAGE}
+    assert found[0] | found[1] == set(CdrForm)
 
 
 def test_no_other_files() -> None:
-    assert {file.stem for file in FOLDER.iterdir()} == {*PLANS, "forms"}
+    assert {file.stem for file in FOLDER.iterdir()} == {*PLANS, GENERAL, "forms"}
