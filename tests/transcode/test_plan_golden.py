@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from protobuf_types import descriptor_of, general_file
 from ros_types import describe, nasty_types, protobuf_class, struct_type
 
 from rosidl_adapter_proto.interfaces.scalars import SCALARS, CdrForm
 from rosidl_adapter_proto.transcode.plan import UNBOUNDED, VERSION, Operation, Plan, build_plan
 from rosidl_adapter_proto.transcode.protobuf_plan import NATURAL_FORMS, protobuf_plan
+from tests.transcode.recorded_plans import plan_of_text
 
 FOLDER = Path(__file__).parents[1] / "golden" / "plans"
 TYPES = {
@@ -30,10 +32,10 @@ PLANS: dict[str, tuple[str, dict[str, Any]]] = {
     "image": ("test/msg/Image", {"omit_empty_messages": True}),
     "chosen_fields": ("test/msg/Image", {"fields": ["header.stamp.nanosec", "width"]}),
 }
-
-
-GENERAL = "general"
-"""The plan of a message that does not come from ROS."""
+RECORDED = {"imu": "sensor_msgs/msg/Imu"}
+"""Plans of texts that are in files beside them."""
+GENERAL, GENERAL_SET = "general", "general_set"
+"""The plan of a message that does not come from ROS, and the descriptor set that it is of."""
 
 
 def bound(number: int) -> str:
@@ -58,10 +60,13 @@ def plan_text(plan: Plan) -> str:
     return text
 
 
+def in_lines(content: bytes) -> str:
+    digits = content.hex()
+    return "bytes\n" + "".join(f"{digits[i : i + 100]}\n" for i in range(0, len(digits), 100))
+
+
 def golden(plan: Plan) -> str:
-    packed = plan.pack().hex()
-    lines = (packed[i : i + 100] for i in range(0, len(packed), 100))
-    return f"{plan_text(plan)}bytes\n" + "".join(f"{line}\n" for line in lines)
+    return plan_text(plan) + in_lines(plan.pack())
 
 
 def forms() -> str:
@@ -103,6 +108,17 @@ def test_golden_plan(name: str, request: pytest.FixtureRequest) -> None:
     compare(name, golden(plan_of(name)), request)
 
 
+@pytest.mark.parametrize("name", RECORDED)
+def test_golden_plan_of_a_recorded_text(name: str, request: pytest.FixtureRequest) -> None:
+    text = (FOLDER / f"{name}_text.txt").read_bytes()
+    compare(name, golden(plan_of_text(text, RECORDED[name])), request)
+
+
+def test_general_set(request: pytest.FixtureRequest) -> None:
+    content = FileDescriptorSet(file=[general_file()]).SerializeToString(deterministic=True)
+    compare(GENERAL_SET, f"a descriptor set\n{in_lines(content)}", request)
+
+
 def test_forms(request: pytest.FixtureRequest) -> None:
     compare("forms", forms(), request)
 
@@ -115,4 +131,10 @@ def test_plans_have_every_form() -> None:
 
 
 def test_no_other_files() -> None:
-    assert {file.stem for file in FOLDER.iterdir()} == {*PLANS, GENERAL, "forms"}
+    assert {file.stem for file in FOLDER.iterdir()} == {
+        *PLANS,
+        *RECORDED,
+        *(f"{each}_text" for each in RECORDED),
+        *(GENERAL, GENERAL_SET),
+        "forms",
+    }
