@@ -69,7 +69,8 @@ class Conversion {
       if (out == nullptr) return false;
       if (steps_.write(route, message.data, {out, size}, error)) return end(size), true;
     }
-    result_.failures.push_back({index, message});
+    ++result_.failure_counts[message.topic_id];
+    if (result_.failures.size() < kKeptFailures) result_.failures.push_back({index, message});
     return !route.copy_failed || copy_message(message, route.failed_topic_id);
   }
 
