@@ -46,19 +46,26 @@ constexpr BuiltinType builtin_type(CdrForm form) {
     case CdrForm::Int16:
       return BuiltinType::Int16;
     case CdrForm::Uint32:
+    case CdrForm::Varuint32:
       return BuiltinType::Uint32;
     case CdrForm::Int32:
+    case CdrForm::Varint32:
+    case CdrForm::Zigzag32:
       return BuiltinType::Int32;
     case CdrForm::Float:
       return BuiltinType::Float32;
     case CdrForm::Uint64:
+    case CdrForm::Varuint64:
       return BuiltinType::Uint64;
     case CdrForm::Int64:
+    case CdrForm::Varint64:
+    case CdrForm::Zigzag64:
       return BuiltinType::Int64;
     case CdrForm::Double:
       return BuiltinType::Float64;
     case CdrForm::String:
     case CdrForm::Wstring:
+    case CdrForm::Bytes:
     case CdrForm::Message:
       return BuiltinType::String;
   }
@@ -203,9 +210,9 @@ class FlatPairs {
     return value;
   }
 
-  bool has_blobs() const { return format_ != FlatFormat::Module; }
-
+  // Modules have no blobs.
   At blob(At at, const Text& path, const Text& last, uint32_t offset, uint32_t size) {
+    if (format_ == FlatFormat::Module) return at;
     uint8_t* const value = pair(at, path, last, BuiltinType::Blob, 2 * sizeof(uint32_t));
     if (value == nullptr) return at;
     store_little(value, offset);

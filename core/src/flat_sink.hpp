@@ -108,8 +108,12 @@ class FlatSink : public Stop {
     constexpr BuiltinType type = builtin_type(F{});
     const uint64_t count = numbers.count();
     const uint8_t* const bytes = numbers.bytes();
-    if (bytes != nullptr || numbers.absent()) return values_together(op, at, type, bytes, count);
     const uint64_t outside = enter(op);
+    if (bytes != nullptr || numbers.absent()) {
+      at = values_together(op, at, type, bytes, count);
+      leave(outside);
+      return at;
+    }
     uint64_t shown = shown_of(count);
     IndexText index(0);
     const bool good = numbers.each([&](typename F::Raw raw) {
@@ -140,6 +144,16 @@ class FlatSink : public Stop {
   At wstring(const Operation& op, At at, int64_t element, const Units& units) {
     return element_of(op, at, element,
                       [&](const Text& last) { return pairs_.wstring(at, path_, last, units); });
+  }
+
+  // As an array of uint8.
+  At bytes(const Operation& op, At at, int64_t element, Text bytes) {
+    if (element != kNoElement && static_cast<uint64_t>(element) >= shown_) return at;
+    const uint64_t outside = enter(op);
+    if (element != kNoElement) push(IndexText(static_cast<uint64_t>(element)).text());
+    at = values_together(op, at, BuiltinType::Uint8, bytes.data, bytes.size);
+    leave(outside);
+    return at;
   }
 
   Nested begin(const Operation& op, At at, int64_t element) {
@@ -188,7 +202,7 @@ class FlatSink : public Stop {
                begin = reinterpret_cast<uintptr_t>(set_.message.data);
     const uint64_t before = place - begin;
     *offset = static_cast<uint32_t>(before);
-    return pairs_.has_blobs() && bytes != nullptr && place >= begin && before <= set_.message.size &&
+    return bytes != nullptr && place >= begin && before <= set_.message.size &&
            count <= set_.message.size - before && before + count <= UINT32_MAX;
   }
 
@@ -212,21 +226,20 @@ class FlatSink : public Stop {
     return at;
   }
 
-  // Numbers that lie together, or that are all zero if there are no bytes.
+  // Numbers that lie together, or that are all zero if there are no bytes; their path is entered.
   ROSIDL_PROTO_NO_INLINE At values_together(const Operation& op, At at, BuiltinType type,
                                             const uint8_t* bytes, uint64_t count) {
     uint32_t offset;
-    const bool blob = op.cdr == CdrForm::Uint8 || op.cdr == CdrForm::Int8;
+    const bool blob = op.cdr == CdrForm::Uint8 || op.cdr == CdrForm::Int8 || op.cdr == CdrForm::Bytes;
     if (blob && count > set_.policy.maximum && find_bytes(bytes, count, &offset))
-      return pairs_.blob(at, path_, name(field_of(op)), offset, static_cast<uint32_t>(count));
-    const uint64_t outside = enter(op), shown = shown_of(count);
+      return pairs_.blob(at, path_, {nullptr, 0}, offset, static_cast<uint32_t>(count));
+    const uint64_t shown = shown_of(count);
     const uint8_t size = size_of(type);
     IndexText index(0);
     for (uint64_t i = 0; i < shown; ++i, index.next()) {
       const uint64_t raw = bytes == nullptr ? 0 : load_raw(bytes + i * size, size);
       at = named_or_number(op, at, index.text(), type, raw);
     }
-    leave(outside);
     return at;
   }
 
