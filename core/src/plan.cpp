@@ -5,6 +5,7 @@
 #include <exception>
 #include <numeric>
 
+#include "heap_sort.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 #include "text.hpp"
 
@@ -307,7 +308,7 @@ const char* Plan::derive(Message& message) {
 // Links the operations in the order of their field numbers; those that have none come first and are left out.
 const char* Plan::order(Message& message) {
   const auto first = by_number_.begin() + message.first, last = first + message.count;
-  std::sort(first, last,
+  heap_sort(first, last,
             [this](uint32_t a, uint32_t b) { return operations_[a].number < operations_[b].number; });
   auto numbered =
       std::find_if(first, last, [this](uint32_t index) { return operations_[index].number != 0; });
