@@ -141,7 +141,7 @@ class _Builder:
                 note = self._note(descriptor, field)
                 operations.append(_operation(field, index, note))
                 notes.append(note)
-                self._count(1, len(note.enum_values))
+                self._count(1, 0 if field.enum_type is None else len(field.enum_type.values))
             if not operations:
                 operations, notes = [_filler()], [NO_NOTE]
                 self._count(1, 0)
