@@ -82,8 +82,8 @@ class ReleasedParser:
     def set_array_policy(self, clamp: bool, maximum: int) -> None:
         self.host.call("pj_parser_set_array_policy", self.instance, clamp, maximum)
 
-    def decode(self, message: bytes) -> bytes | None:
-        """Return the output; None for a message that is dropped."""
+    def decode(self, message: bytes, function: str = "pj_parser_decode") -> bytes | None:
+        """Return the output; None for a message that is dropped. The document has another function for it."""
         host = self.host
         if self.input_size < len(message):
             host.call("free", self.input)
@@ -91,7 +91,7 @@ class ReleasedParser:
             self.input = host.allocate(self.input_size)
         pages = host.memory.size(host.store)
         host.memory.write(host.store, message, self.input)
-        size = host.call("pj_parser_decode", self.instance, self.input, len(message), self.output)
+        size = host.call(function, self.instance, self.input, len(message), self.output)
         # The pointer to the output was taken before the call.
         assert host.memory.size(host.store) == pages
         if size <= 0:
