@@ -9,6 +9,13 @@ namespace {
 
 uint64_t memory_size() { return __builtin_wasm_memory_size(0) * kPageSize; }
 
+bool can_allocate(uint64_t size) {
+  void* memory = std::malloc(static_cast<size_t>(size));
+  asm volatile("" : "+r"(memory));  // else compilers do neither of both
+  std::free(memory);
+  return memory != nullptr;
+}
+
 }  // namespace
 
 bool FixedMemory::now = false;
@@ -25,10 +32,19 @@ std::string_view memory_from(uint64_t address) noexcept {
 
 bool have_memory(uint64_t size) noexcept {
   if (size > SIZE_MAX / 2) return false;
-  void* memory = std::malloc(static_cast<size_t>(size));
-  asm volatile("" : "+r"(memory));  // else compilers do neither of both
-  std::free(memory);
-  return memory != nullptr;
+  uint64_t largest = 0;
+  {
+    const FixedMemory fixed;
+    for (uint64_t step = size; step > 0; step /= 2) {
+      if (largest + step <= size && can_allocate(largest + step)) largest += step;
+    }
+  }
+  if (largest == size) return true;
+  // `malloc` would get all of it anew. What is there lies at the end, where the rest comes after it.
+  void* const most = std::malloc(static_cast<size_t>(largest));
+  const bool rest = can_allocate(size - largest);
+  std::free(most);
+  return rest && can_allocate(size);
 }
 
 }  // namespace rosidl_proto::plugin

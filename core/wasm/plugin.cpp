@@ -6,8 +6,6 @@
 namespace rosidl_proto::plugin {
 namespace {
 
-constexpr size_t kMaximumTypeName = 256;
-
 // Schemas are read with these limits, one after the other, since the last ones need much memory.
 constexpr SchemaLimits kLimits[] = {{300, 1'500}, {2'400, 12'000}, {}};
 
@@ -35,7 +33,6 @@ Place* find_place(uint64_t handle) {
 
 const char* Parser::load(std::string_view type_name, std::string_view schema) noexcept {
   flattener.reset();
-  if (type_name.size() > kMaximumTypeName) return "the name of the type has more than 256 bytes";
   if (schema.size() > kMaximumSchemaSize) return "the schema has more than 4194304 bytes";
   std::vector<uint8_t> packed_plan;
   FlatNotes notes;

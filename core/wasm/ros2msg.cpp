@@ -19,6 +19,8 @@ uint64_t reading_memory(size_t schema_size, const SchemaLimits&) noexcept {
 
 const char* read_schema(std::string_view schema, std::string_view type_name,
                         std::vector<uint8_t>* packed_plan, FlatNotes*, const SchemaLimits&) noexcept {
+  constexpr size_t kMaximumTypeName = 256;  // it may be in those of all definitions
+  if (type_name.size() > kMaximumTypeName) return "the name of the type has more than 256 bytes";
   return read_ros2msg(schema, type_name, packed_plan);
 }
 

@@ -6,6 +6,7 @@ Facts from `wasm_runtime.cpp` and `wasm_parser.cpp` of that program. Whatever th
 from __future__ import annotations
 
 import struct
+from functools import cache
 from pathlib import Path
 
 import wasmtime
@@ -23,17 +24,23 @@ _NUMBERS = {
 _STRING, _BLOB = 18, 19
 
 
+@cache
+def _compiled(plugin: Path) -> tuple[wasmtime.Engine, wasmtime.Module]:
+    engine = wasmtime.Engine()
+    return engine, wasmtime.Module.from_file(engine, plugin)
+
+
 class ReleasedHost:
     """One plugin, with one instance for all topics."""
 
     def __init__(self, plugin: Path, memory_limit: int | None = None) -> None:
-        engine = wasmtime.Engine()
+        engine, module = _compiled(plugin)
         self.store = wasmtime.Store(engine)
         if memory_limit is not None:
             self.store.set_limits(memory_size=memory_limit)
         linker = wasmtime.Linker(engine)
         linker.define_wasi()
-        instance = linker.instantiate(self.store, wasmtime.Module.from_file(engine, plugin))
+        instance = linker.instantiate(self.store, module)
         self.exports = instance.exports(self.store)
         memory = self.exports["memory"]
         assert isinstance(memory, wasmtime.Memory)
