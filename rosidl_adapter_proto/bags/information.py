@@ -69,7 +69,7 @@ def bag_information(bag: Bag) -> BagInformation:
     warnings: dict[str, None] = {}
     for index, file in enumerate(bag.files):
         try:
-            with bag.recording.open(index) as reader:
+            with bag.open_file(index) as reader:
                 first = next(iter(reader.chunks()), None)
                 compressions[_compression(bag, index) or (first.compression if first else "")] = None
                 warnings.update(dict.fromkeys(label_warnings(reader, file.topics)))

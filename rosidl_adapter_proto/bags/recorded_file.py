@@ -30,6 +30,7 @@ from rosidl_adapter_proto.bags.storage import (
     MAXIMUM_CHUNK_SIZE,
     MCAP,
     ROSBAG,
+    SALVAGE,
     SQLITE3,
     StorageReader,
 )
@@ -275,7 +276,7 @@ class _OpenedFile:
     def _damaged(self, reason: str) -> None:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
-            raise BagError(f"{reason}; `bag convert --on-error skip` leaves such messages out")
+            raise BagError(f"{reason}; {SALVAGE} the others")
         self._damages.add(reason)
 
     def _inner_metadata(self, reader: StorageReader) -> BagMetadata | None:

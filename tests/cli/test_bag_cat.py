@@ -225,6 +225,31 @@ def test_topics_are_completed(before: list[str], typed: str, expected: list[str]
     assert complete.get_completions(["bag", before[0], "none", *before[2:]], typed) == []
 
 
+def test_a_bag_that_was_cut_off(bag: Path, run: Run) -> None:
+    whole = bag.read_bytes()
+    bag.write_bytes(whole[: len(whole) // 2])
+    ended = run("bag", "cat", "bag.mcap", "/imu")
+    assert (ended.code, ended.out) == (3, "")
+    assert ended.err.endswith(
+        " whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them\n"
+    )
+
+    ended = run("bag", "cat", "bag.mcap", "/imu", "--salvage")
+
+    assert ended.code == 1 and 100 < len(ended.out.splitlines()) < 400
+    searched, chunk, message = ended.err.splitlines()
+    assert searched.startswith(
+        "Warning: bag.mcap: the recording was not finished: it has no end; it was searched"
+    )
+    assert chunk.startswith("Warning: bag.mcap at byte 38: a Chunk record has ")
+    assert message.startswith("Warning: bag.mcap at byte ")
+    assert run("bag", "info", "bag.mcap").code == 3
+    information = run("bag", "info", "bag.mcap", "--salvage")
+    assert (information.code, information.err) == (1, ended.err)
+    bag.write_bytes(whole)
+    assert run("bag", "cat", "bag.mcap", "/imu", "--salvage") == run("bag", "cat", "bag.mcap", "/imu")
+
+
 def test_a_pipe_that_closes(bag: Path) -> None:
     program = [sys.executable, "-c", "from rosidl_adapter_proto.cli import main; main()"]
     command = " ".join(f"'{part}'" for part in [*program, "bag", "cat", "bag.mcap", "/imu"])
