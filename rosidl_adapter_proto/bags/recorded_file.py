@@ -211,7 +211,7 @@ class _OpenedFile:
         if damage is not None:
             self._damages.add(str(damage))
         metadata = metadata or self._inner_metadata(reader)
-        self._messages_compressed = metadata is not None and metadata.compression_mode == "MESSAGE"
+        self._messages_compressed = metadata is not None and metadata.compresses_messages
         if metadata is not None and self._messages_compressed and metadata.compression_format != ZSTD:
             known = f"compressed with {metadata.compression_format!r}; only zstd is known"
             raise BagError(f"{self.path}: its messages are {known}")

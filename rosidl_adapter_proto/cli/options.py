@@ -95,7 +95,9 @@ def bag_source_options(command: Command) -> Command:
 
 def salvage_option(command: Command) -> Command:
     """Add the option that reads damaged bags as well."""
-    help_text = "Read what is whole of a damaged or cut off file. What is not is told, and the exit code is 1."
+    help_text = (
+        "Read what is whole of a damaged or cut off file. What is not is told, and the exit code is 1."
+    )
     return click.option("--salvage", is_flag=True, help=help_text)(command)
 
 
