@@ -22,7 +22,7 @@ from rosidl_adapter_proto.bags.storage import SALVAGE, StorageReader
 from rosidl_adapter_proto.bags.topic_names import no_such_topic
 from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.bags.warning_list import WarningList
-from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.errors import BagError, RequestError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.time import to_nanoseconds
 from rosidl_adapter_proto.transcode.plan import chosen_names
@@ -172,7 +172,8 @@ class Bag:
             topic: The name of the topic.
 
         Raises:
-            BagError: There is no such topic, or nothing is known of its type.
+            BagError: Nothing is known of its type.
+            RequestError: There is no such topic.
         """
         (name,) = self._names(topic)
         return self.types.schema(self.topics[name])
@@ -214,7 +215,8 @@ class Bag:
                 empty in the messages.
 
         Raises:
-            BagError: There is no such topic; or, while messages are read, a file is damaged.
+            BagError: While messages are read: a file is damaged.
+            RequestError: There is no such topic.
             SchemaError: A topic does not have one of the fields.
             TypeError: A time is none, or `fields` is one text.
         """
@@ -247,7 +249,8 @@ class Bag:
             For each run of messages, the open file that it is in and the run.
 
         Raises:
-            BagError: There is no such topic; or, while messages are read, a file is damaged.
+            BagError: While messages are read: a file is damaged.
+            RequestError: There is no such topic.
             TypeError: A time is none.
         """
         names = frozenset(self._names(topics))
@@ -329,7 +332,7 @@ class Bag:
                 )
 
     def _source(self, path: str, topic: Topic, fields: Sequence[str] | None) -> MessageSource:
-        return MessageSource(path, topic, lambda: decoder(topic, self.types, fields))
+        return MessageSource(path, topic, lambda: self.types, fields)
 
     @cached_property
     def _contents(self) -> tuple[Sequence[BagFile], Sequence[str]]:
@@ -371,7 +374,7 @@ class Bag:
         names = [topics] if isinstance(topics, str) else list(topics)
         for name in names:
             if name not in self.topics:
-                raise BagError(f"{self.path}: {no_such_topic(name, self.topics)}")
+                raise RequestError(f"{self.path}: {no_such_topic(name, self.topics)}")
         return names
 
     def _check_open(self) -> None:

@@ -320,7 +320,7 @@ def _with_metadata(
         if differing:
             names = " and ".join(differing)
             contradictions.append(
-                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file"
+                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file, which is believed"
             )
     return topics, contradictions
 

@@ -32,7 +32,7 @@ def show_bag_warnings(bag: Bag) -> int:
 def size_text(size: float) -> str:
     """Return a number of bytes as people read it."""
     unit = 0
-    while size >= 1000 and unit < len(_UNITS) - 1:
+    while size >= 999.5 and unit < len(_UNITS) - 1:
         size /= 1000
         unit += 1
     digits = 0 if unit == 0 or size >= 99.95 else 1

@@ -195,8 +195,9 @@ def test_the_file_counts_where_metadata_contradicts_it(tmp_path: Path) -> None:
             "cdr",
         )
         assert reader.warnings == [
-            f"{path}: /a: metadata.yaml says another QoS than the file",
-            f"{path}: /b: metadata.yaml says another type and serialization format and type hash than the file",
+            f"{path}: /a: metadata.yaml says another QoS than the file, which is believed",
+            f"{path}: /b: metadata.yaml says another type and serialization format and type hash than the file, "
+            "which is believed",
         ]
     _describe(tmp_path, "a.db3", topics=topics[:1], message_count=40)
     with Reader(tmp_path) as oracle:

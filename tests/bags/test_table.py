@@ -284,7 +284,7 @@ def error(kind: type[Exception], call: Callable[[], object]) -> str:
 
 def test_what_is_asked_for_is_not_there(path: Path, tmp_path: Path) -> None:
     assert (
-        error(BagError, lambda: table_reader(path, "/im"))
+        error(RequestError, lambda: table_reader(path, "/im"))
         == f"{path}: there is no topic /im; did you mean /imu?"
     )
     assert error(SchemaError, lambda: table_reader(path, "/imu", fields=["heade.stamp"])) == (
