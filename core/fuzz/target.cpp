@@ -46,17 +46,40 @@ void check_error(const Plan& plan, const Error& error, uint64_t size) {
   field_path(error, plan);
 }
 
+using Append = bool(const Plan&, Input, Output, uint64_t*, Error&) noexcept;
+
+// One step makes what two steps make, in memory of exactly that size or with a byte more, and fails where
+// they fail.
+void check_one_step(const Plan& plan, Input message, Append* append, const Heap* proto) {
+  for (const uint64_t more : {0, 1}) {
+    Heap room((proto == nullptr ? message.size : proto->size) + more);
+    Error error;
+    uint64_t size = 0;
+    if (!append(plan, message, {room.data.get(), room.size}, &size, error)) {
+      check_error(plan, error, message.size);
+      check(proto == nullptr, "one step fails where two do not");
+    } else {
+      check(proto != nullptr && size == proto->size &&
+                std::memcmp(room.data.get(), proto->data.get(), size) == 0,
+            "one step and two make different messages");
+    }
+  }
+}
+
 std::unique_ptr<Heap> to_proto(const Plan& plan, Input cdr) {
   Error error;
   Lengths lengths;
   uint64_t size = 0;
-  if (!measure_cdr_to_proto(plan, cdr, kLimit, lengths, &size, error))
-    return check_error(plan, error, cdr.size), nullptr;
+  if (!measure_cdr_to_proto(plan, cdr, kLimit, lengths, &size, error)) {
+    check_error(plan, error, cdr.size);
+    return check_one_step(plan, cdr, append_cdr_to_proto, nullptr), nullptr;
+  }
   check(size <= kLimit, "a result passes the limit");
   check(lengths.size() <= cdr.size, "there are more lengths than bytes");
   auto proto = std::make_unique<Heap>(size);
   check(write_cdr_to_proto(plan, cdr, lengths, 0, {proto->data.get(), size}, error),
         "measured CDR cannot be written");
+  check_one_step(plan, cdr, append_cdr_to_proto, proto.get());
   return proto;
 }
 
@@ -77,12 +100,15 @@ std::unique_ptr<Heap> ros1_to_proto(const Plan& plan, Input ros1) {
   Error error;
   Lengths lengths;
   uint64_t size = 0;
-  if (!measure_ros1_to_proto(plan, ros1, kLimit, lengths, &size, error))
-    return check_error(plan, error, ros1.size), nullptr;
+  if (!measure_ros1_to_proto(plan, ros1, kLimit, lengths, &size, error)) {
+    check_error(plan, error, ros1.size);
+    return check_one_step(plan, ros1, append_ros1_to_proto, nullptr), nullptr;
+  }
   check(size <= kLimit, "a result passes the limit");
   auto proto = std::make_unique<Heap>(size);
   check(write_ros1_to_proto(plan, ros1, lengths, 0, {proto->data.get(), size}, error),
         "measured ROS 1 cannot be written");
+  check_one_step(plan, ros1, append_ros1_to_proto, proto.get());
   return proto;
 }
 
