@@ -149,10 +149,10 @@ TEST(names_that_are_made_to_collide_are_refused) {
   for (int i = 0; i < 128; ++i) {
     fields += "int8 ";
     for (int bit = 0; bit < 7; ++bit) fields += pieces[i >> bit & 1];
-    fields += "\n";
+    fields += '\n';
   }
   CHECK_EQUAL(wrong(fields, "a/B"), "too many fields of a message have names with the same hash");
-  CHECK_EQUAL(wrong(fields.substr(0, 64 * 62), "a/B"), "");
+  CHECK_EQUAL(wrong(fields.substr(0, size_t{64} * 62), "a/B"), "");
 }
 
 }  // namespace
