@@ -13,7 +13,6 @@ namespace rosidl_proto {
 namespace {
 
 constexpr const char* kLargeMessage = "a message of this type is larger than 2 GiB";
-constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 
 // Sizes past what a message can have are all alike; stopping there keeps the arithmetic from overflowing.
 constexpr uint64_t kTooLarge = uint64_t{1} << 40;

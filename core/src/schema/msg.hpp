@@ -7,9 +7,6 @@
 
 namespace rosidl_proto {
 
-// The field that ROS gives to a message without fields.
-constexpr std::string_view kFiller = "structure_needs_at_least_one_member";
-
 class MessageReader {
  public:
   MessageReader(const TypeName& type, bool own_header) : type_(type), own_header_(own_header) {}

@@ -60,8 +60,7 @@ const char* Planner::plan(Definition& definition, uint32_t depth) {
   MessageReader reader(definition.type, definitions_.find(own_header) != nullptr);
   if (const char* wrong = reader.read(definition.text)) return wrong;
   operations_ += reader.fields.size();
-  if (operations_ > kMaximumOperations)
-    return "the type has more than 20000 fields, those of the types in it included";
+  if (operations_ > kMaximumOperations) return kTooManyFields;
   if (const char* wrong = number_fields(reader.fields)) return wrong;
 
   definition.height = 1;
