@@ -5,16 +5,14 @@
 #include <exception>
 #include <numeric>
 
+#include "heap_sort.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 #include "text.hpp"
 
 namespace rosidl_proto {
 namespace {
 
-constexpr char kMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
-constexpr size_t kHeaderBytes = 20, kMessageBytes = 24, kOperationBytes = 40;
 constexpr const char* kLargeMessage = "a message of this type is larger than 2 GiB";
-constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 
 // Sizes past what a message can have are all alike; stopping there keeps the arithmetic from overflowing.
 constexpr uint64_t kTooLarge = uint64_t{1} << 40;
@@ -203,21 +201,21 @@ const char* Plan::load(const uint8_t* data, size_t size) noexcept {
 }
 
 const char* Plan::read(const uint8_t* data, size_t size) {
-  if (size < kHeaderBytes || std::memcmp(data, kMark, sizeof kMark - 1) != 0)
+  if (size < kPlanHeaderBytes || std::memcmp(data, kPlanMark, sizeof kPlanMark - 1) != 0)
     return "the plan does not begin as a plan does";
-  if (data[3] != static_cast<uint8_t>(kMark[3])) {
+  if (data[3] != static_cast<uint8_t>(kPlanMark[3])) {
     return "the plan has another version than this core, which reads version 2; build it again";
   }
-  Words header(data + sizeof kMark);
+  Words header(data + sizeof kPlanMark);
   const uint64_t messages = header.word(), operations = header.word(), names = header.word();
   const uint32_t partial = header.word();
-  if (size != kHeaderBytes + messages * kMessageBytes + operations * kOperationBytes + names ||
+  if (size != kPlanHeaderBytes + messages * kPlanMessageBytes + operations * kPlanOperationBytes + names ||
       messages == 0) {
     return "the plan does not have the size that it names";
   }
   if (partial > 1) return "the plan has an unknown property";
   partial_ = partial != 0;
-  const uint8_t* p = data + kHeaderBytes;
+  const uint8_t* p = data + kPlanHeaderBytes;
   names_.assign(reinterpret_cast<const char*>(data + size - names), names);
   const auto is_name = [this](Name name) {
     return uint64_t{name.place} + name.size <= names_.size() &&
@@ -236,7 +234,7 @@ const char* Plan::read(const uint8_t* data, size_t size) {
     if (!is_name(message.name) || !is_name(message.protobuf_name))
       return "the plan has a name that is not among its names";
     first += message.count;
-    p += kMessageBytes;
+    p += kPlanMessageBytes;
   }
   if (first != operations) return "the messages of the plan do not cover its operations";
   operations_.resize(operations);
@@ -244,7 +242,7 @@ const char* Plan::read(const uint8_t* data, size_t size) {
     if (const char* wrong = read_operation(p, op)) return wrong;
     if (!is_name(op.name) || !is_name(op.protobuf_name))
       return "the plan has a name that is not among its names";
-    p += kOperationBytes;
+    p += kPlanOperationBytes;
   }
   return nullptr;
 }
@@ -309,7 +307,7 @@ const char* Plan::derive(Message& message) {
 // Links the operations in the order of their field numbers; those that have none come first and are left out.
 const char* Plan::order(Message& message) {
   const auto first = by_number_.begin() + message.first, last = first + message.count;
-  std::sort(first, last,
+  heap_sort(first, last,
             [this](uint32_t a, uint32_t b) { return operations_[a].number < operations_[b].number; });
   auto numbered =
       std::find_if(first, last, [this](uint32_t index) { return operations_[index].number != 0; });

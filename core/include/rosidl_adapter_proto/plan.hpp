@@ -16,12 +16,19 @@ namespace rosidl_proto {
 // The version of packed plans, which is a digit in them: VERSION in plan.py.
 constexpr int kPlanVersion = 2;
 
+// How a packed plan begins, and the sizes of its parts.
+constexpr char kPlanMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
+constexpr size_t kPlanHeaderBytes = 20, kPlanMessageBytes = 24, kPlanOperationBytes = 40;
+
 // Deeper nesting is refused. Plans cannot recur, so this bounds the stack for every input.
 constexpr uint32_t kMaximumDepth = 100;
 
 // The largest protobuf message, and the largest result
 // (https://protobuf.dev/programming-guides/encoding/#size-limit).
 constexpr uint64_t kMaximumSize = 0x7fffffff;
+
+// https://protobuf.dev/programming-guides/proto3/#assigning
+constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 
 // "No bound", for counts and for string lengths.
 constexpr uint32_t kUnbounded = 0xffffffff;
