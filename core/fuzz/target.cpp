@@ -1,4 +1,4 @@
-// The fuzz target: all directions, plans themselves, and chunks of messages.
+// The fuzz target: all directions, columns and pairs, plans themselves, and chunks of messages.
 //
 // The first byte of an input says what to do with the rest:
 //   0  the number of a plan, and then a CDR message; 1  the same with a protobuf message
@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "columns.hpp"
+#include "flat.hpp"
 #include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
@@ -197,6 +198,7 @@ void run(const Plan& plan, bool is_cdr, Input message) {
   round_trip(plan, is_cdr, message);
   is_cdr ? change(plan, message) : change_proto(plan, message);
   fuzz_columns(plan, message, check);
+  fuzz_flat(plan, message, check);
   const uint64_t number = 1;
   Slice slice;
   const uint8_t* const end = message.data + message.size;
