@@ -39,6 +39,13 @@ TEXTS = (
 )
 """Definitions of `test/msg/Root`."""
 
+GENERAL = (
+    bytes.fromhex("f80107 82020bffffffffffffffffff0103"),
+    bytes.fromhex("a202050a01781001 a20200 aa021508feffffffffffffffff0112080a016e12030a016d"),
+    bytes.fromhex("f2010205ff f20100 f20103010203 7a03000102 1a020a00"),
+)
+"""Messages of the plan `general`: enumerations, maps, bytes."""
+
 
 def sized(content: bytes) -> bytes:
     return struct.pack("<I", len(content)) + content
@@ -88,6 +95,11 @@ def main(directory: Path) -> None:
                     (inputs / f"{number}_{kind}_{i}").write_bytes(content)
     for number, text in enumerate(TEXTS):
         (inputs / f"text_{number}").write_bytes(b"\6" + text.encode())
+    # Protobuf that does not come from ROS: maps, enumerations, messages in themselves.
+    golden = (ROOT / "tests" / "golden" / "plans" / "general.txt").read_text().partition("\nbytes\n")[2]
+    for i, content in enumerate(GENERAL):
+        (inputs / f"{len(plans)}_proto_{i}").write_bytes(bytes((1, len(plans))) + content)
+    plans.append(bytes.fromhex(golden))
     (directory / "plans.bin").write_bytes(b"".join(map(sized, plans)))
 
 

@@ -1,4 +1,4 @@
-// The fuzz target: all directions, plans themselves, chunks of messages, and schemas.
+// The fuzz target: all directions, columns and pairs, plans themselves, chunks of messages, and schemas.
 //
 // The first byte of an input says what to do with the rest:
 //   0  the number of a plan, and then a CDR message; 1  the same with a protobuf message
@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "columns.hpp"
+#include "flat.hpp"
 #include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
 #include "rosidl_adapter_proto/schema.hpp"
@@ -199,6 +200,7 @@ void run(const Plan& plan, bool is_cdr, Input message) {
   round_trip(plan, is_cdr, message);
   is_cdr ? change(plan, message) : change_proto(plan, message);
   fuzz_columns(plan, message, check);
+  fuzz_flat(plan, message, check);
   const uint64_t number = 1;
   Slice slice;
   const uint8_t* const end = message.data + message.size;

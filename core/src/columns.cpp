@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <exception>
 
-#include "cdr_reader.hpp"
 #include "column_sink.hpp"
-#include "protobuf_reader.hpp"
+#include "read_message.hpp"
 
 namespace rosidl_proto {
 namespace {
@@ -181,27 +180,15 @@ bool Columns::append(Serialization serialization, Input message, Error& error) n
 }
 
 bool Columns::run(Serialization serialization, Input message, Error& error) {
-  uint8_t nothing;
-  if (message.size == 0) message.data = &nothing;  // a place that is nowhere is an error
-  const ColumnSink sink(room_);
   Column* at = columns_.data();
+  const ColumnSink sink(room_);
   switch (serialization) {
-    case Serialization::Cdr: {
-      bool swapped;
-      if (!byte_order(message, &swapped, error)) return false;
-      return swapped ? CdrReader<true, true, ColumnSink>(*plan_, message, sink, error).run(&at)
-                     : CdrReader<false, true, ColumnSink>(*plan_, message, sink, error).run(&at);
-    }
-    case Serialization::Ros1:
-      return CdrReader<false, true, ColumnSink, Ros1>(*plan_, message, sink, error).run(&at);
+    case Serialization::Cdr:
+      return read_message<Serialization::Cdr>(*plan_, message, sink, *fields_, &at, error);
     case Serialization::Protobuf:
-      if (message.size > kMaximumSize) {
-        error.reason = Reason::WireSize;
-        error.a = message.size;
-        return false;
-      }
-      return ProtobufReader<true, true, ColumnSink>(*plan_, message, sink, error)
-          .run(fields_->slots(), false, &at);
+      return read_message<Serialization::Protobuf>(*plan_, message, sink, *fields_, &at, error);
+    case Serialization::Ros1:
+      return read_message<Serialization::Ros1>(*plan_, message, sink, *fields_, &at, error);
   }
   return false;
 }

@@ -110,10 +110,12 @@ class Plan {
   const Message& root() const { return messages_[0]; }
   const Message& message(uint32_t index) const { return messages_[index]; }
   uint32_t message_count() const { return static_cast<uint32_t>(messages_.size()); }
+  uint32_t operation_count() const { return static_cast<uint32_t>(operations_.size()); }
   const Operation& operation(uint32_t index) const { return operations_[index]; }
   const Operation* begin(const Message& message) const { return operations_.data() + message.first; }
   const Operation* end(const Message& message) const { return begin(message) + message.count; }
   std::string text(Name name) const { return names_.substr(name.place, name.size); }
+  const std::string& names() const { return names_; }  // all of them
 
   // The operation of `message` with this field number, or nullptr.
   const Operation* find(const Message& message, uint32_t number) const;
