@@ -6,6 +6,7 @@
 //   message
 //   4  the number of a plan, and then a message of ROS 1
 //   5  a chunk, in which each topic id is the number of a plan and a way to treat its messages
+//   6  a FileDescriptorSet of `test.General`
 // The plans with numbers are in the file that the environment variable ROSIDL_PROTO_FUZZ_PLANS names, each
 // with its size before it. make_corpus.py writes that file and inputs to begin with.
 #include <cstdio>
@@ -16,6 +17,7 @@
 #include "columns.hpp"
 #include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
+#include "rosidl_adapter_proto/schema.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 
@@ -294,6 +296,23 @@ void run_chunk(const std::vector<Plan>& plans, Input chunk) {
   check(place == found.size() && failed == result.failures.size(), "there are too many messages");
 }
 
+// Schemas
+// ----------------------------------------------------------------------------------------------------------
+
+void run_descriptor_set(const uint8_t* data, size_t size) {
+  check(file_descriptor_set_size(data, size) <= size, "a descriptor set is larger than its memory");
+  std::vector<uint8_t> packed;
+  FlatNotes notes;
+  if (read_file_descriptor_set(data, size, "test.General", &packed, &notes) != nullptr) return;
+  Plan plan;
+  // What the reader leaves to this: names that are no UTF-8, field numbers that are there twice.
+  if (plan.load(packed.data(), packed.size()) != nullptr) return;
+  size_t operations = 0;
+  for (uint32_t i = 0; i < plan.message_count(); ++i) operations += plan.message(i).count;
+  check(notes.empty() || notes.size() == operations, "a field has no note");
+  run(plan, false, {data, size});
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -311,6 +330,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     run_ros1(plans[data[1] % plans.size()], {data + 2, size - 2});
   } else if (mode == 5) {
     run_chunk(plans, {data + 1, size - 1});
+  } else if (mode == 6) {
+    run_descriptor_set(data + 1, size - 1);
   }
   return 0;
 }
