@@ -76,10 +76,14 @@ def read_program(plugin: str | Path | bytes) -> Program:
         plugin: Its file, or its bytes.
 
     Raises:
-        PluginError: It cannot be read, is too large, or is no WebAssembly.
+        PluginError: It cannot be read, is too large, or is no WebAssembly, or there is no engine to run it.
     """
-    import wasmtime
-
+    try:
+        import wasmtime
+    except ImportError as error:
+        raise PluginError(
+            f"{error}; pip install 'rosidl-adapter-proto[plotjuggler]' brings what runs plugins"
+        ) from None
     name = "plugin" if isinstance(plugin, bytes) else Path(plugin).name
     data = plugin if isinstance(plugin, bytes) else _file_bytes(Path(plugin))
     if len(data) > MAXIMUM_FILE_SIZE:
@@ -245,6 +249,8 @@ class Instance:
         Raises:
             Trap: The plugin was stopped.
         """
+        if size > self._limits.memory:
+            return 0
         if self._allocator is not None:
             address: int = self.call(self._allocator, size) & 0xFFFF_FFFF
             return address if address + size <= self.memory.data_len(self.store) else 0
