@@ -9,7 +9,7 @@ import numpy
 
 from rosidl_adapter_proto.errors import PluginError
 from rosidl_adapter_proto.plotjuggler.dialects import Dialect
-from rosidl_adapter_proto.plotjuggler.engine import PAGE, Limits, Program, write
+from rosidl_adapter_proto.plotjuggler.engine import Limits, Program, write
 from rosidl_adapter_proto.plotjuggler.loops import ERROR_SIZE, OUTPUTS, Stop
 from rosidl_adapter_proto.plotjuggler.module_manifest import Claim, ModuleManifest
 from rosidl_adapter_proto.plotjuggler.session import (
@@ -40,7 +40,7 @@ class ModuleSession(Session):
         self._manifest = manifest
         # Where the module says where its output is, two numbers of 64 bits, and room for the text of an error.
         self._slots = self.allocate(16 + ERROR_SIZE, "results")
-        self._loop["memory"].grow(self.instance.store, OUTPUT_CAPACITY // PAGE)
+        self.instance.grow(self._loop["memory"], OUTPUT_CAPACITY)
 
     def create(self, request: ParserRequest) -> int:
         if request.array_policy is not None:
