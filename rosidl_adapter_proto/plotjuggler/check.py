@@ -30,6 +30,7 @@ from rosidl_adapter_proto.plotjuggler.manifest import (
 from rosidl_adapter_proto.plotjuggler.module_manifest import ModuleManifest, read_module_manifest
 from rosidl_adapter_proto.plotjuggler.modules import INPUT_HEADER, ModuleSession
 from rosidl_adapter_proto.plotjuggler.session import BrokenContract, Messages, ParserRequest, Session
+from rosidl_adapter_proto.plotjuggler.values import shown
 
 MODULE_MEMORY = 256 << 20
 MODULE_INSTRUCTIONS = 10_000_000
@@ -213,7 +214,7 @@ def _module_points(program: Program, dialect: Dialect) -> Iterator[Point]:
     yield from exports
     names = {function.name for function in dialect.functions}
     others = [
-        name
+        shown(name)
         for name in (*program.functions, *program.file.other_exports)
         if name == "_start" or (name.startswith("pj_module_") and name not in names)
     ]

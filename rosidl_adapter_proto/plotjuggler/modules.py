@@ -20,6 +20,7 @@ from rosidl_adapter_proto.plotjuggler.session import (
     ParserRequest,
     Session,
 )
+from rosidl_adapter_proto.plotjuggler.values import shown
 
 OUTPUT_CAPACITY = 16 << 20
 """How many bytes an output may have here; the contract has no limit but memory."""
@@ -151,4 +152,4 @@ def binding(claim_index: int, claim: Claim, request: ParserRequest) -> bytes:
 
 def _error_text(data: bytes) -> str:
     """Return the text of an error that a module has written."""
-    return data.partition(b"\0")[0].decode(errors="replace") or "it says no reason"
+    return shown(data.partition(b"\0")[0].decode(errors="replace")) or "it says no reason"

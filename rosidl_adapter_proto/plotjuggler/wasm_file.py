@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from rosidl_adapter_proto.errors import PluginError
+from rosidl_adapter_proto.plotjuggler.values import shown
 
 PAGE = 1 << 16
 MAGIC = b"\0asm"
@@ -153,7 +154,7 @@ def _types(reader: _Reader) -> Iterator[Signature]:
 def _imports(reader: _Reader) -> Iterator[tuple[str, int, int | None]]:
     """Return the name of each import, its kind, and the type of a function or the maximum of a memory."""
     for _ in range(reader.number()):
-        name = f"{reader.name()}.{reader.name()}"
+        name = shown(f"{reader.name()}.{reader.name()}")
         kind = reader.byte()
         value: int | None = None
         if kind == _FUNCTION:
