@@ -35,7 +35,7 @@ class Limits:
 
     Attributes:
         memory: How many bytes of memory it may have.
-        instructions: How many instructions a call may take; with these, a loop without end is stopped in about a second.
+        instructions: How many instructions a call may take; with these, an endless loop is stopped in about a second.
     """
 
     memory: int = 256 << 20
