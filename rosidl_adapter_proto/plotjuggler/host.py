@@ -10,11 +10,11 @@ with plugin.parser("/imu", "sensor_msgs/msg/Imu", schema) as parser:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy
 
@@ -53,6 +53,7 @@ __all__ = [
 
 
 MAXIMUM_STRIKES = 3
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +144,8 @@ class Plugin:
             PluginError: The plugin does not make one.
             RequestError: The topic or the type has a NUL byte.
         """
+        if "\0" in topic + type_name:
+            raise RequestError("a topic and a type have no NUL byte")
         return Parser(self, ParserRequest(topic, type_name, schema, array_policy), embedded_time)
 
     @property
@@ -161,10 +164,7 @@ class Plugin:
                 f"{self.name}: broke its contract {MAXIMUM_STRIKES} times, and is not run again"
             )
         if self._session is None:
-            try:
-                self._session = self._start()
-            except Trap as trap:
-                raise PluginError(f"{self.name}: stopped while it began: {trap.reason}") from None
+            self._session = self._begun(self._start)
         return self._session
 
     def _start(self) -> Session:
@@ -172,10 +172,20 @@ class Plugin:
             return ModuleSession(self._program, self._dialect, self._limits, self.manifest)
         return FunctionsSession(self._program, self._dialect, self._limits)
 
+    def _begun(self, start: Callable[[], _T]) -> _T:
+        try:
+            return start()
+        except Trap as trap:
+            raise PluginError(f"{self.name}: it was stopped while it began: {trap.reason}") from None
+
     def strike(self) -> None:
         """Count a time that the plugin was stopped or broke its contract: modules are not run after the third."""
         if self._dialect.name == "module":
             self._strikes += 1
+
+    def runs(self, session: Session) -> bool:
+        """Tell whether a session is the one that runs, and was not thrown away."""
+        return session is self._session
 
     def discard(self) -> None:
         """Throw away what runs, after a trap: the next session is a fresh one."""
@@ -184,10 +194,11 @@ class Plugin:
     def _read_manifest(self) -> Manifest | ModuleManifest:
         if self._dialect.name == "module":
             return read_module_manifest(self._program.data)
+        instance = self._begun(lambda: Instance(self._program, self._limits, None))
         try:
-            text = manifest_text(Instance(self._program, self._limits, None))
+            text = manifest_text(instance)
         except Trap as trap:
-            raise PluginError(f"{self.name}: stopped in pj_plugin_manifest: {trap.reason}") from None
+            raise PluginError(f"{self.name}: it was stopped in pj_plugin_manifest: {trap.reason}") from None
         try:
             return read_manifest(text)
         except PluginError:
@@ -233,7 +244,7 @@ class Parser:
     def close(self) -> None:
         """Give back what it has in the plugin."""
         session, self._session = self._session, None
-        if session is not None and session is self._plugin.session():
+        if session is not None and self._plugin.runs(session):
             try:
                 session.destroy(self._handle)
             except Trap as trap:
@@ -253,7 +264,10 @@ class Parser:
         view = memoryview(data).cast("B")
         times = None if time is None else numpy.array([time], "i8")
         messages = Messages(view, numpy.zeros(1, "i8"), numpy.array([len(view)], "i8"), times)
-        outputs = next(self._outputs(messages))
+        try:
+            outputs = next(self._outputs(messages))
+        except BrokenContract as broken:
+            raise self._broken(broken.index, broken.reason) from None
         begin, size = int(outputs.begins[0]), int(outputs.sizes[0])
         if size <= 0:
             return Parsed((), time, outputs.refused[0])
