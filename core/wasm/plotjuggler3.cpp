@@ -1,5 +1,6 @@
 // PlotJuggler 3: the functions in its document, and those that its releases call instead. Both make parsers
 // with the same one, so which function a message is given to says how its pairs are written.
+#include <algorithm>
 #include <cstdlib>
 
 #include "encoding.hpp"
@@ -20,9 +21,8 @@ std::string_view text_at(uint32_t address) {
 
 uint32_t flatten(uint32_t self, uint32_t data, uint32_t size, uint32_t output, FlatFormat format) {
   Parser* const parser = find_parser(self);
-  if (parser == nullptr || !is_memory(data, size) || !is_memory(output, 0)) return 0;
-  uint64_t room = kOutputSize;
-  while (!is_memory(output, room)) room /= 2;
+  if (parser == nullptr || !is_memory(data, size)) return 0;
+  const uint64_t room = std::min(kOutputSize, uint64_t{memory_from(output).size()});
   return static_cast<uint32_t>(parser->flatten(format, {reinterpret_cast<const uint8_t*>(data), size},
                                                {reinterpret_cast<uint8_t*>(output), room}));
 }
