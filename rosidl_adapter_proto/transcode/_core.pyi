@@ -55,6 +55,9 @@ def pack_records(
 def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int], int, int]:
     """Return what `records.RecordIndex` has."""
 
+KEPT_FAILURES: int
+"""Of how many messages of a chunk that fail it is told which they are."""
+
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""
 
@@ -68,9 +71,9 @@ class RecordConverter:
 
     def _convert(
         self, data: Buffer, start_time: int, end_time: int | None, /
-    ) -> tuple[PooledMemory, int, list[tuple[int, int, int, int, TranscodeError]]]:
-        """Return the new chunk, how many messages it has, and of those that failed topic id, log time, sequence number,
-        index and error."""
+    ) -> tuple[PooledMemory, int, dict[int, int], list[tuple[int, int, int, int, TranscodeError]]]:
+        """Return the new chunk, how many messages it has, how many of each topic failed, and of the first of those
+        topic id, log time, sequence number, index and error."""
 
 class Transcoder:
     def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...
