@@ -58,6 +58,17 @@ def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int
 KEPT_FAILURES: int
 """Of how many messages of a chunk that fail it is told which they are."""
 
+def read_ros2msg(text: bytes, type_name: str) -> bytes:
+    """Return the packed plan of a type with hashed field numbers, as `Plan.pack` does, without Python.
+
+    Args:
+        text: Its definition and those of the types in it, as recordings have them with the encoding `ros2msg`.
+        type_name: The type that it is recorded for.
+
+    Raises:
+        ValueError: The text is not valid, or not one of messages.
+    """
+
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""
 

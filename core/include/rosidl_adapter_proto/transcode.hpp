@@ -13,6 +13,10 @@
 
 namespace rosidl_proto {
 
+// The numbers of `SERIALIZATIONS` in rosidl_adapter_proto/transcode/columns.py.
+enum class Serialization : uint8_t { Cdr, Protobuf, Ros1 };
+constexpr uint8_t kSerializations = 3;
+
 struct Input {
   const uint8_t* data;
   uint64_t size;
