@@ -1,77 +1,102 @@
 #include "plugin.hpp"
 
-#include <cstdlib>
-#include <cstring>
+#include <vector>
+
+#include "memory.hpp"
+#include "rosidl_adapter_proto/schema.hpp"
 
 namespace rosidl_proto::plugin {
 namespace {
 
-constexpr uint64_t kPageSize = 65536;
+#if defined(ROSIDL_PROTO_PLUGIN_ROS2MSG)
+constexpr std::string_view kEncoding = "ros2msg";
+constexpr Serialization kSerialization = Serialization::Cdr;
 
-// A handle is a number of its own and the place of the parser, counted from 1.
-constexpr uint32_t kPlaceBits = 16, kMaximumParsers = (1u << kPlaceBits) - 1, kGenerations = 1u << 15;
+const char* read_schema(std::string_view schema, std::string_view type_name,
+                        std::vector<uint8_t>* packed_plan, FlatNotes*) {
+  return read_ros2msg(schema, type_name, packed_plan);
+}
+#elif defined(ROSIDL_PROTO_PLUGIN_PROTOBUF)
+constexpr std::string_view kEncoding = "protobuf";
+constexpr Serialization kSerialization = Serialization::Protobuf;
 
-struct Entry {
-  uint32_t handle = 0;  // the last one that was given for this place
-  std::unique_ptr<Parser> parser;
+const char* read_schema(std::string_view, std::string_view, std::vector<uint8_t>*, FlatNotes*) {
+  return "not yet";
+}
+#else
+#error "ROSIDL_PROTO_PLUGIN_PROTOBUF or ROSIDL_PROTO_PLUGIN_ROS2MSG says which plugin this is"
+#endif
+
+// What reading a schema allocates at most, if nothing of it is used twice. The names of types have their own
+// limit, since any number of messages can have one in common.
+constexpr uint64_t kMemoryOfAny = 256 << 10, kMemoryOfByte = 100;
+constexpr size_t kMaximumTypeName = 1024;
+
+// A handle is the place of a parser, counted from 1, and above it a number that is another one for each
+// parser at that place.
+constexpr uint32_t kPlaces = 1 << 14, kHandles = 1u << 31;
+
+struct Place {
+  uint32_t handle;  // the last one
+  Parser* parser;
 };
 
-std::vector<Entry>& entries() {
-  static std::vector<Entry> all;
-  return all;
-}
+Place places[kPlaces];
 
-uint32_t next_handle(uint32_t handle, uint32_t place) {
-  const uint32_t generation = ((handle >> kPlaceBits) + 1) % kGenerations;
-  return generation << kPlaceBits | (place + 1);
+Place* find_place(uint64_t handle) {
+  Place& place = places[(handle - 1) % kPlaces];
+  return place.parser != nullptr && place.handle == handle ? &place : nullptr;
 }
 
 }  // namespace
 
-bool is_memory(uint64_t address, uint64_t size) noexcept {
-  const uint64_t all = __builtin_wasm_memory_size(0) * kPageSize;
-  return address != 0 && address <= all && size <= all - address;
+std::string_view encoding() noexcept { return kEncoding; }
+
+std::string_view schema_at(uint64_t address) noexcept { return text_at(address); }
+
+const char* Parser::load(std::string_view type_name, std::string_view schema) noexcept {
+  flattener.reset();
+  if (type_name.size() > kMaximumTypeName) return "the name of the type has more than 1024 bytes";
+  if (schema.size() > kMaximumSchemaSize) return "the schema has more than 4194304 bytes";
+  if (!have_memory(kMemoryOfAny + kMemoryOfByte * schema.size())) return kNoMemory;
+  std::vector<uint8_t> packed_plan;
+  FlatNotes notes;
+  if (const char* problem = read_schema(schema, type_name, &packed_plan, &notes)) return problem;
+  Plan plan;
+  if (const char* problem = plan.load(packed_plan.data(), packed_plan.size())) return problem;
+  auto loaded = std::make_unique<Flattener>();
+  const char* const problem = loaded->load(std::move(plan), std::move(notes), FlatFormat::Page);
+  if (problem == nullptr) flattener = std::move(loaded);
+  return problem;
 }
 
-std::string_view text_at(uint32_t address) noexcept {
-  if (!is_memory(address, 1)) return {};
-  const uint64_t rest = __builtin_wasm_memory_size(0) * kPageSize - address;
-  const char* const text = reinterpret_cast<const char*>(address);
-  const void* const end = std::memchr(text, 0, static_cast<size_t>(rest));
-  if (end == nullptr) return {};
-  return {text, static_cast<size_t>(static_cast<const char*>(end) - text)};
+uint64_t Parser::flatten(FlatFormat format, Input message, Output output) noexcept {
+  const FixedMemory fixed;
+  flattener->set_format(format);
+  error = {};
+  return flattener->flatten(kSerialization, message, output, error);
 }
 
-bool have_memory(uint64_t size) noexcept {
-  if (size > SIZE_MAX / 2) return false;
-  void* const memory = std::malloc(static_cast<size_t>(size));
-  std::free(memory);
-  return memory != nullptr;
-}
-
-const char* Parser::load(std::string_view, std::string_view) noexcept {
-  return "this plugin reads no schemas yet";
-}
-
-uint32_t add_parser(std::unique_ptr<Parser> parser) {
-  std::vector<Entry>& all = entries();
-  uint32_t place = 0;
-  while (place < all.size() && all[place].parser) ++place;
-  if (place == kMaximumParsers) return 0;
-  if (place == all.size()) all.emplace_back();
-  all[place].parser = std::move(parser);
-  return all[place].handle = next_handle(all[place].handle, place);
+uint32_t add_parser() noexcept {
+  uint32_t free = 0;
+  while (free < kPlaces && places[free].parser != nullptr) ++free;
+  if (free == kPlaces || !have_memory(sizeof(Parser))) return 0;
+  Place& place = places[free];
+  place.handle = place.handle == 0 ? free + 1 : (place.handle + kPlaces) % kHandles;
+  place.parser = new Parser;
+  return place.handle;
 }
 
 Parser* find_parser(uint64_t handle) noexcept {
-  std::vector<Entry>& all = entries();
-  const uint64_t place = (handle & kMaximumParsers) - 1;
-  return place < all.size() && all[place].handle == handle ? all[place].parser.get() : nullptr;
+  const Place* const place = find_place(handle);
+  return place == nullptr ? nullptr : place->parser;
 }
 
 void remove_parser(uint64_t handle) noexcept {
-  if (find_parser(handle) == nullptr) return;
-  entries()[(handle & kMaximumParsers) - 1].parser.reset();
+  Place* const place = find_place(handle);
+  if (place == nullptr) return;
+  delete place->parser;
+  place->parser = nullptr;
 }
 
 }  // namespace rosidl_proto::plugin

@@ -1,40 +1,48 @@
-// What the dialects of a plugin share: its parsers, and care with what hosts pass.
+// What the dialects of a plugin share: its parsers, which hosts know by handles.
 //
-// A trap is never an answer: PlotJuggler ends loading with it. So addresses are checked before they are used,
-// parsers are found by handles and not by pointers, and memory is there before anything needs it.
+// A trap is never an answer: PlotJuggler stops loading a file with it. So nothing that a host says is
+// believed, neither addresses nor handles, and there is memory before anything needs it.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <string_view>
-#include <vector>
 
-#include "rosidl_adapter_proto/plan.hpp"
+#include "rosidl_adapter_proto/flat.hpp"
+
+// Makes a function one of those that hosts call.
+#define ROSIDL_PROTO_EXPORT(name) extern "C" __attribute__((export_name(#name), used))
 
 namespace rosidl_proto::plugin {
 
-// Hosts of PlotJuggler 3 give so much for the pairs of a message, and do not say so.
-constexpr uint32_t kOutputSize = 1 << 20;
+// The most that a message is flattened to: hosts of PlotJuggler 3 have so much room, and do not say so.
+constexpr uint64_t kOutputSize = 1 << 20;
+
+constexpr const char* kNoMemory = "there is not enough memory";
+
+// The encoding of messages, as PlotJuggler names it.
+std::string_view encoding() noexcept;
+
+// The schema at an address that a host gives no size for. There is a NUL behind it.
+std::string_view schema_at(uint64_t address) noexcept;
 
 struct Parser {
-  Plan plan;
+  std::unique_ptr<Flattener> flattener;  // none before there is a schema
+  std::unique_ptr<uint8_t[]> output;     // of PlotJuggler 4; others have their own
+  Error error;                           // of the last message
+  const char* wrong = nullptr;           // of anything else
 
-  // Reads a schema. Returns nullptr, or what is wrong with it.
+  // Reads a schema, in place of the one before. Returns nullptr, or what is wrong.
   const char* load(std::string_view type_name, std::string_view schema) noexcept;
+
+  // Returns how many bytes were written, or 0 and an error.
+  uint64_t flatten(FlatFormat format, Input message, Output output) noexcept;
 };
 
-// The bytes of a host are in the memory of the plugin.
-bool is_memory(uint64_t address, uint64_t size) noexcept;
-
-// The bytes at an address, without the NUL that ends them; nullptr data if they have no end.
-std::string_view text_at(uint32_t address) noexcept;
-
-// So much can be allocated now, in one piece or in several.
-bool have_memory(uint64_t size) noexcept;
-
-// A parser is known by a handle, which is never 0 and not given again soon.
-uint32_t add_parser(std::unique_ptr<Parser> parser);
-Parser* find_parser(uint64_t handle) noexcept;  // nullptr for what is not the handle of a live parser
+// The handle of a new parser, which is above 0 and does not come again soon; 0 if there is no room for one.
+uint32_t add_parser() noexcept;
+// The parser with this handle, or nullptr.
+Parser* find_parser(uint64_t handle) noexcept;
 void remove_parser(uint64_t handle) noexcept;
 
 }  // namespace rosidl_proto::plugin

@@ -41,11 +41,14 @@ RECIPES = (
 
 # Relative to the folder of the core, where the compiler runs: so no path of this machine comes into a plugin.
 _SOURCES = (
-    "wasm/plotjuggler3.cpp",
-    "wasm/plugin.cpp",
-    "wasm/runtime.cpp",
-    "src/plan.cpp",
-    "src/text.cpp",
+    *("wasm/memory.cpp", "wasm/plotjuggler3.cpp", "wasm/plotjuggler4.cpp", "wasm/plugin.cpp"),
+    *("src/error.cpp", "src/flat.cpp", "src/plan.cpp", "src/proto_to_cdr.cpp", "src/text.cpp"),
+    *(
+        "src/schema/field_numbers.cpp",
+        "src/schema/lines.cpp",
+        "src/schema/packed_plan.cpp",
+        "src/schema/ros2msg.cpp",
+    ),
 )
 # Only what every host has: WebAssembly 1.0, and copying of memory. 256 MiB is what PlotJuggler 4 allows.
 _MEMORY_MAXIMUM = 256 << 20
@@ -63,7 +66,7 @@ _MANIFEST_SECTION = b"pj_parser_module_manifest"
 def build_plugins(output: Path) -> list[Path]:
     """Build `protobuf.wasm` and `ros2msg.wasm`. What the same sources give is the same, byte for byte.
 
-    The first time takes half a minute more: the compiler builds its C++ library, and keeps it in the user's cache folder
+    The first time takes longer: the compiler builds its C++ library, and keeps it in the user's cache folder
     (`ZIG_GLOBAL_CACHE_DIR` names another).
 
     Args:
