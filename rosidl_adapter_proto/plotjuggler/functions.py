@@ -70,7 +70,7 @@ class FunctionsSession(Session):
         )
 
     def outputs(self, first: int, begin: int, end: int) -> Outputs:
-        _, rows = self._rows(begin, end)
+        rows = self._rows(begin, end)
         sizes = rows[:, 3].astype("<i4")
         refused = {
             first + begin + at: f"{self.dialect.parse} returned {sizes[at]}"
@@ -81,7 +81,7 @@ class FunctionsSession(Session):
     def offence(self, stop: Stop, row: int) -> str:
         if stop is Stop.GUARD_OVERWRITTEN:
             return f"it wrote past the {OUTPUT_CAPACITY} bytes that an output has"
-        _, rows = self._rows(row, row + 1)
+        rows = self._rows(row, row + 1)
         return f"it says that it wrote {rows[0, 3]} bytes, but an output has at most {OUTPUT_CAPACITY}"
 
     def _pack(self, messages: Messages, first: int, last: int) -> Packed:

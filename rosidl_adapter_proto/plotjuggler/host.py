@@ -21,10 +21,17 @@ import numpy
 from rosidl_adapter_proto.errors import PluginError, RequestError
 from rosidl_adapter_proto.plotjuggler.columns import Batch, Collector, Templates
 from rosidl_adapter_proto.plotjuggler.dialects import DIALECTS, Dialect, served_dialects
-from rosidl_adapter_proto.plotjuggler.engine import Limits, Program, Trap, read_program
+from rosidl_adapter_proto.plotjuggler.engine import Instance, Limits, Program, Trap, read_program
 from rosidl_adapter_proto.plotjuggler.functions import FunctionsSession
 from rosidl_adapter_proto.plotjuggler.loops import Stop
-from rosidl_adapter_proto.plotjuggler.manifest import Manifest, read_manifest
+from rosidl_adapter_proto.plotjuggler.manifest import (
+    MAXIMUM_SIZE,
+    Manifest,
+    read_manifest,
+    read_released_manifest,
+)
+from rosidl_adapter_proto.plotjuggler.module_manifest import ModuleManifest, read_module_manifest
+from rosidl_adapter_proto.plotjuggler.modules import ModuleSession
 from rosidl_adapter_proto.plotjuggler.output import ReadLayout, field_value, message_time
 from rosidl_adapter_proto.plotjuggler.session import BrokenContract, Messages, Outputs, ParserRequest, Session
 from rosidl_adapter_proto.plotjuggler.values import ArrayPolicy, Blob, BuiltinType, Pair
@@ -43,6 +50,9 @@ __all__ = [
     "Plugin",
     "open_plugin",
 ]
+
+
+MAXIMUM_STRIKES = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +101,7 @@ class Plugin:
         name: What its file is called.
         dialects: The dialects that it serves.
         dialect: The one that it is spoken to in.
-        manifest: What it says of itself.
+        manifest: What it says of itself; that of a parser module where it is spoken to as one.
     """
 
     def __init__(self, program: Program, dialects: tuple[str, ...], dialect: Dialect, limits: Limits) -> None:
@@ -102,12 +112,13 @@ class Plugin:
         self._dialect = dialect
         self._limits = limits
         self._session: Session | None = None
+        self._strikes = 0
         self.manifest = self._read_manifest()
 
     @property
-    def encoding(self) -> str:
-        """The encoding of the messages that it parses, such as `ros2msg`."""
-        return self.manifest.encoding
+    def encodings(self) -> tuple[str, ...]:
+        """The encodings of the messages that it parses, such as `ros2msg`."""
+        return self.manifest.encodings
 
     def parser(
         self,
@@ -145,24 +156,58 @@ class Plugin:
         Raises:
             PluginError: It cannot be started.
         """
+        if self._strikes == MAXIMUM_STRIKES:
+            raise PluginError(
+                f"{self.name}: broke its contract {MAXIMUM_STRIKES} times, and is not run again"
+            )
         if self._session is None:
             try:
-                self._session = FunctionsSession(self._program, self._dialect, self._limits)
+                self._session = self._start()
             except Trap as trap:
                 raise PluginError(f"{self.name}: stopped while it began: {trap.reason}") from None
         return self._session
+
+    def _start(self) -> Session:
+        if isinstance(self.manifest, ModuleManifest):
+            return ModuleSession(self._program, self._dialect, self._limits, self.manifest)
+        return FunctionsSession(self._program, self._dialect, self._limits)
+
+    def strike(self) -> None:
+        """Count a time that the plugin was stopped or broke its contract: modules are not run after the third."""
+        if self._dialect.name == "module":
+            self._strikes += 1
 
     def discard(self) -> None:
         """Throw away what runs, after a trap: the next session is a fresh one."""
         self._session = None
 
-    def _read_manifest(self) -> Manifest:
-        instance = self.session().instance
+    def _read_manifest(self) -> Manifest | ModuleManifest:
+        if self._dialect.name == "module":
+            return read_module_manifest(self._program.data)
         try:
-            address = instance.call("pj_plugin_manifest") & 0xFFFF_FFFF
+            text = manifest_text(Instance(self._program, self._limits, None))
         except Trap as trap:
             raise PluginError(f"{self.name}: stopped in pj_plugin_manifest: {trap.reason}") from None
-        return read_manifest(instance.text(address, 1 << 16).decode())
+        try:
+            return read_manifest(text)
+        except PluginError:
+            if self._dialect.name == "page":
+                raise
+            return read_released_manifest(text)  # which is no YAML
+
+
+def manifest_text(instance: Instance) -> str:
+    """Return what `pj_plugin_manifest` says.
+
+    Raises:
+        PluginError: It is no text.
+        Trap: The plugin was stopped.
+    """
+    address = instance.call("pj_plugin_manifest") & 0xFFFF_FFFF
+    try:
+        return instance.text(address, MAXIMUM_SIZE).decode()
+    except UnicodeDecodeError as error:
+        raise PluginError(f"manifest: byte {error.start} is not UTF-8") from None
 
 
 class Parser:
@@ -221,7 +266,7 @@ class Parser:
                 Pair(each.key, each.kind, field_value(output, each, len(view))) for each in layout.fields
             ]
         except PluginError as error:
-            raise self._error(0, str(error)) from None
+            raise self._broken(0, str(error)) from None
         return Parsed(tuple(pairs), time)
 
     def parse_batch(self, data: Buffer, ranges: Buffer, times: Buffer | None = None) -> Batch:
@@ -242,7 +287,7 @@ class Parser:
             for outputs in self._outputs(messages):
                 collector.add(outputs)
         except BrokenContract as broken:
-            raise self._error(broken.index, broken.reason) from None
+            raise self._broken(broken.index, broken.reason) from None
         return collector.batch()
 
     def _outputs(self, messages: Messages) -> Iterator[Outputs]:
@@ -264,7 +309,7 @@ class Parser:
                     if done > before:
                         yield session.outputs(first, before, done)
                     if stop not in (Stop.DONE, Stop.FULL) or done == before:
-                        raise self._error(first + done, session.offence(stop, done))
+                        raise self._broken(first + done, session.offence(stop, done))
             except Trap as trap:
                 before, done = done, session.done if count else 0
                 if done > before:
@@ -272,7 +317,7 @@ class Parser:
                 self._plugin.discard()
                 # Many messages together may take more instructions than one may.
                 if not (trap.out_of_instructions and done > before):
-                    raise self._error(first + done, f"it was stopped: {trap.reason}") from None
+                    raise self._broken(first + done, f"it was stopped: {trap.reason}") from None
             first += done
 
     def _ready(self) -> Session:
@@ -285,9 +330,15 @@ class Parser:
                 raise self._error(None, str(error)) from None
             except Trap as trap:
                 self._plugin.discard()
+                self._plugin.strike()
                 raise self._error(None, f"it was stopped while the parser was made: {trap.reason}") from None
             self._session = session
         return session
+
+    def _broken(self, index: int, reason: str) -> PluginError:
+        """Return the error for a broken contract, and count it."""
+        self._plugin.strike()
+        return self._error(index, reason)
 
     def _error(self, index: int | None, reason: str) -> PluginError:
         message = "" if index is None else f"message {index}: "

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 TABLE_ROWS = 4096
 ROW_SIZE = 16
 TABLE_SIZE = TABLE_ROWS * ROW_SIZE
+NEXT = TABLE_SIZE
+"""Where in the loop's own memory the index of the next message is: 32 bits."""
+OUTPUTS = TABLE_SIZE + 8
+"""Where in it the outputs of modules begin."""
 GUARD = b"\xa5\x5a\xc3\x3c\x96\x69\xf0\x0f"
 """What stands behind the room that an output has, and must still stand there when it is written."""
 ERROR_SIZE = 512
@@ -39,14 +43,14 @@ _FUNCTIONS = f"""
 (module
   (import "plugin" "memory" (memory $plugin 0))
   (import "plugin" "function" (func $parse (param i32 i32 i32 i32) (result i32)))
-  (memory $own (export "memory") {TABLE_SIZE >> 16})
-  (global $next (export "next") (mut i32) (i32.const 0))
+  (memory $own (export "memory") {(TABLE_SIZE >> 16) + 1})
   (func (export "run")
     (param $self i32) (param $count i32) (param $out i32) (param $end i32) (param $capacity i32) (result i32)
-    (local $row i32) (local $size i32)
-    (local.set $row (i32.mul (global.get $next) (i32.const {ROW_SIZE})))
+    (local $next i32) (local $row i32) (local $size i32)
+    (local.set $next (i32.load $own (i32.const {NEXT})))
+    (local.set $row (i32.mul (local.get $next) (i32.const {ROW_SIZE})))
     (loop $messages
-      (if (i32.eq (global.get $next) (local.get $count)) (then (return (i32.const {Stop.DONE:d}))))
+      (if (i32.eq (local.get $next) (local.get $count)) (then (return (i32.const {Stop.DONE:d}))))
       (if (i32.gt_u (local.get $capacity) (i32.sub (local.get $end) (local.get $out)))
         (then (return (i32.const {Stop.FULL:d}))))
       (i64.store $plugin
@@ -67,7 +71,8 @@ _FUNCTIONS = f"""
         (then (local.set $out
           (i32.add (local.get $out) (i32.and (i32.add (local.get $size) (i32.const 7)) (i32.const -8))))))
       (local.set $row (i32.add (local.get $row) (i32.const {ROW_SIZE})))
-      (global.set $next (i32.add (global.get $next) (i32.const 1)))
+      (local.set $next (i32.add (local.get $next) (i32.const 1)))
+      (i32.store $own (i32.const {NEXT}) (local.get $next))
       (br $messages))
     (unreachable)))
 """
@@ -78,14 +83,14 @@ _MODULE = f"""
   (import "plugin" "memory" (memory $plugin 0))
   (import "plugin" "function" (func $parse (param i64 i64 i64 i64 i64) (result i32)))
   (import "plugin" "pj_module_last_error" (func $last_error (param i64 i64 i64) (result i64)))
-  (memory $own (export "memory") {TABLE_SIZE >> 16})
-  (global $next (export "next") (mut i32) (i32.const 0))
+  (memory $own (export "memory") {(TABLE_SIZE >> 16) + 1})
   (func (export "run") (param $self i64) (param $count i32) (param $out i32) (param $end i32) (param $slots i32)
     (result i32)
-    (local $row i32) (local $code i32) (local $address i64) (local $size i64) (local $memory_size i64)
-    (local.set $row (i32.mul (global.get $next) (i32.const {ROW_SIZE})))
+    (local $next i32) (local $row i32) (local $code i32) (local $address i64) (local $size i64) (local $memory_size i64)
+    (local.set $next (i32.load $own (i32.const {NEXT})))
+    (local.set $row (i32.mul (local.get $next) (i32.const {ROW_SIZE})))
     (loop $messages
-      (if (i32.eq (global.get $next) (local.get $count)) (then (return (i32.const {Stop.DONE:d}))))
+      (if (i32.eq (local.get $next) (local.get $count)) (then (return (i32.const {Stop.DONE:d}))))
       (i64.store $plugin (local.get $slots) (i64.const 0))
       (i64.store $plugin offset=8 (local.get $slots) (i64.const 0))
       (local.set $code (call $parse
@@ -123,7 +128,8 @@ _MODULE = f"""
         (i32.add (local.get $out)
           (i32.and (i32.add (i32.wrap_i64 (local.get $size)) (i32.const 7)) (i32.const -8))))
       (local.set $row (i32.add (local.get $row) (i32.const {ROW_SIZE})))
-      (global.set $next (i32.add (global.get $next) (i32.const 1)))
+      (local.set $next (i32.add (local.get $next) (i32.const 1)))
+      (i32.store $own (i32.const {NEXT}) (local.get $next))
       (br $messages))
     (unreachable)))
 """

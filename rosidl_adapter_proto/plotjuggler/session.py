@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import abc
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -12,14 +13,15 @@ import numpy
 from rosidl_adapter_proto.errors import PluginError
 from rosidl_adapter_proto.plotjuggler.dialects import Dialect
 from rosidl_adapter_proto.plotjuggler.engine import PAGE, Instance, Limits, Program, memory_view, write
-from rosidl_adapter_proto.plotjuggler.loops import TABLE_ROWS, Stop, loop
+from rosidl_adapter_proto.plotjuggler.loops import NEXT, TABLE_ROWS, Stop, loop
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rosidl_adapter_proto.plotjuggler.values import ArrayPolicy
 
-BATCH_INPUT = 4 << 20
+_BATCH_INPUT = 4 << 20
+_NEXT = struct.Struct("<I")
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,15 +192,16 @@ class Session(abc.ABC):
             Trap: It was stopped.
         """
         sizes = messages.sizes[first : first + TABLE_ROWS]
-        count = max(1, int(numpy.searchsorted(numpy.cumsum(sizes), BATCH_INPUT, side="right")))
+        count = max(1, int(numpy.searchsorted(numpy.cumsum(sizes), _BATCH_INPUT, side="right")))
         packed = self._pack(messages, first, first + min(count, len(sizes)))
         address = self._input_room(len(packed.data))
         write(self.instance.view(), address, packed.data)
         table = numpy.zeros((len(packed.begins), 4), "<u4")
         table[:, 0] = packed.begins + address
         table[:, 1] = packed.sizes
-        write(memory_view(self.instance.store, self._loop["memory"]), 0, table.data)
-        self._loop["next"].set_value(self.instance.store, 0)
+        own = self._own()
+        write(own, 0, table.data)
+        _NEXT.pack_into(own, NEXT, 0)
         return len(table)
 
     def _input_room(self, size: int) -> int:
@@ -215,12 +218,16 @@ class Session(abc.ABC):
     @property
     def done(self) -> int:
         """How many of the messages that were loaded are done."""
-        count: int = self._loop["next"].value(self.instance.store)
+        count: int
+        (count,) = _NEXT.unpack_from(self._own(), NEXT)
         return count
 
-    def _rows(self, begin: int, end: int) -> tuple[memoryview, NDArray[numpy.uint32]]:
-        own = memory_view(self.instance.store, self._loop["memory"])
-        return own, numpy.frombuffer(own, "<u4", 4 * end).reshape(-1, 4)[begin:].copy()
+    def _rows(self, begin: int, end: int) -> NDArray[numpy.uint32]:
+        return numpy.frombuffer(self._own(), "<u4", 4 * end).reshape(-1, 4)[begin:].copy()
+
+    def _own(self) -> memoryview:
+        """The memory of the loop."""
+        return memory_view(self.instance.store, self._loop["memory"])
 
     def allocate(self, size: int, what: str) -> int:
         """Return the address of memory in the plugin that is ours.

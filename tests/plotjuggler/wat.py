@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import wasmtime
 
 MANIFEST = "plugin_type: MessageParser\nname: Echo\nencoding: echo\n"
@@ -71,3 +73,73 @@ def plugin(
     (param $self i32) (param $raw i32) (param $size i32) (param $out i32) (result i32) {parse})
   {malloc})
 """)
+
+
+MODULE_MANIFEST = {
+    "module_abi": 1,
+    "id": "org.example.echo",
+    "name": "Echo",
+    "version": "1.0.0",
+    "claims": [
+        {"claim_id": "any", "encoding": "json", "type_name": "*", "routes": ["scalar"], "priority": 0},
+    ],
+}
+
+MODULE_ECHO = """
+    (i64.store (i32.wrap_i64 (local.get $address_slot)) (i64.add (local.get $in) (i64.const 24)))
+    (i64.store (i32.wrap_i64 (local.get $size_slot)) (i64.sub (local.get $size) (i64.const 24)))
+    (i32.const 0)
+"""
+"""Gives the message, which is behind 24 bytes."""
+
+
+def module(
+    parse: str = MODULE_ECHO,
+    *,
+    bind: str = "(i32.const 0)",
+    create: str = "(i64.const 7)",
+    abi: str = "(i32.const 1)",
+    last_error: str = "(i64.const 0)",
+    manifests: tuple[bytes, ...] = (json.dumps(MODULE_MANIFEST).encode(),),
+    more: str = "",
+    memory: str = "2 4096",
+) -> bytes:
+    """Return a plugin in the dialect `module`.
+
+    Args:
+        parse: The body of the function that parses: `$self`, `$in`, `$size`, `$address_slot`, `$size_slot`.
+        bind: The body of the function that binds: `$self`, `$address`, `$size`.
+        create: The body of the function that makes a parser: `$claim`.
+        abi: The body of `pj_module_abi`.
+        last_error: The body of the function that says what was wrong: `$self`, `$buffer`, `$capacity`.
+        manifests: What the sections with manifests have.
+        more: More of the module.
+        memory: How large its memory is: pages, and at most so many.
+    """
+    made = wasm(f"""
+(module
+  {more}
+  (memory (export "memory") {memory})
+  {MALLOC.replace('(export "malloc")', "$malloc")}
+  (func (export "_initialize"))
+  (func (export "pj_module_abi") (result i32) {abi})
+  (func (export "pj_module_create") (param $claim i32) (result i64) {create})
+  (func (export "pj_module_destroy") (param $self i64))
+  (func (export "pj_module_bind") (param $self i64) (param $address i64) (param $size i64) (result i32) {bind})
+  (func (export "pj_module_parse")
+    (param $self i64) (param $in i64) (param $size i64) (param $address_slot i64) (param $size_slot i64) (result i32)
+    {parse})
+  (func (export "pj_module_last_error")
+    (param $self i64) (param $buffer i64) (param $capacity i64) (result i64) {last_error})
+  (func (export "pj_module_alloc") (param $size i64) (result i64)
+    (i64.extend_i32_u (call $malloc (i32.wrap_i64 (local.get $size)))))
+  (func (export "pj_module_free") (param $address i64) (param $size i64)))
+""")
+    return made + b"".join(section("pj_parser_module_manifest", each) for each in manifests)
+
+
+def section(name: str, content: bytes) -> bytes:
+    """Return a custom section of a WebAssembly file."""
+    body = bytes([len(name)]) + name.encode() + content
+    size = len(body)
+    return bytes([0, size & 0x7F | 0x80, size >> 7 & 0x7F | 0x80, size >> 14]) + body
