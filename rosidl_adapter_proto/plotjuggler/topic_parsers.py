@@ -184,4 +184,4 @@ def encodings(topic: Topic) -> tuple[str, ...]:
 
 def is_for(plugin: Plugin, topic: Topic) -> bool:
     """Tell whether a plugin is for the encoding of a topic; it may name several."""
-    return any(each in plugin.encoding.split(";") for each in encodings(topic) if each)
+    return any(each in plugin.encodings for each in encodings(topic) if each)
