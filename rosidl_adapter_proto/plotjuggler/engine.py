@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MAXIMUM_FILE_SIZE = 64 << 20
 PAGE = 1 << 16
 _MAGIC = b"\0asm"
-_WASI = ("wasi_snapshot_preview1", "wasi_unstable")
+_WASI = ("wasi_snapshot_preview1.", "wasi_unstable.")
 _INITIALIZERS = ("_initialize", "__wasm_call_ctors")  # the first that there is is called, as PlotJuggler does
 
 
@@ -103,6 +103,11 @@ def read_program(plugin: str | Path | bytes) -> Program:
             maximum = kind.limits.max * PAGE
     imports = tuple(f"{each.module}.{each.name}" for each in module.imports)
     return Program(name, data, module, functions, tuple(others), imports, maximum)
+
+
+def is_wasi(name: str) -> bool:
+    """Tell whether an import, as `module.name`, is of WASI: such functions are there, and do nothing."""
+    return name.startswith(_WASI)
 
 
 def _file_bytes(path: Path) -> bytes:
