@@ -1,4 +1,4 @@
-"""The plugins, built."""
+"""The plugins, built once for each version of their sources."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path("build/plugins").absolute()
+from rosidl_adapter_proto.plotjuggler.build import build_plugins, source_digest
+
+BUILT = Path(__file__).parent.parent.parent / "build" / "plugins"
 
 
 @pytest.fixture(scope="session")
 def plugin_files() -> dict[str, Path]:
     """Our plugins by their encodings."""
-    return {path.stem: path for path in FOLDER.glob("*.wasm")}
+    folder = BUILT / source_digest()
+    paths = sorted(folder.glob("*.wasm")) or build_plugins(folder)
+    return {path.stem: path for path in paths}
