@@ -83,7 +83,7 @@ def read_program(plugin: str | Path | bytes) -> Program:
     name = "plugin" if isinstance(plugin, bytes) else Path(plugin).name
     data = plugin if isinstance(plugin, bytes) else _file_bytes(Path(plugin))
     if len(data) > MAXIMUM_FILE_SIZE:
-        raise PluginError(f"{name}: {len(data)} bytes; a plugin has at most {MAXIMUM_FILE_SIZE}")
+        raise PluginError(f"{name}: more than {MAXIMUM_FILE_SIZE} bytes, which no plugin has")
     if not data.startswith(_MAGIC):  # wasmtime would take a text for one
         raise PluginError(f"{name}: not a WebAssembly file")
     try:
@@ -177,9 +177,7 @@ class Instance:
         """
         import wasmtime
 
-        unknown = [
-            name for name in program.imports if not name.startswith(tuple(f"{each}." for each in _WASI))
-        ]
+        unknown = [name for name in program.imports if not is_wasi(name)]
         if unknown:
             raise PluginError(
                 f"{program.name}: imports {', '.join(unknown)}, which a plugin does not get; build it without imports"

@@ -160,7 +160,7 @@ def parse_module_manifest(text: bytes) -> ModuleManifest:
     if len(text) > MAXIMUM_SIZE:
         raise PluginError(f"{SECTION}: {len(text)} bytes; at most {MAXIMUM_SIZE} are read")
     try:
-        document = json.loads(text.decode())
+        document = json.loads(text.decode(), parse_constant=_refuse_constant)
     except UnicodeDecodeError as error:
         raise PluginError(f"{SECTION}: byte {error.start} is not UTF-8") from None
     except json.JSONDecodeError as error:
@@ -182,6 +182,10 @@ def parse_module_manifest(text: bytes) -> ModuleManifest:
             raise claim_members.error("claim_id", f"a second {claim.claim_id!r}")
         claims[claim.claim_id] = claim
     return ModuleManifest(identifier, name, version, tuple(claims.values()))
+
+
+def _refuse_constant(name: str) -> None:
+    raise json.JSONDecodeError(f"there is no {name}", "", 0)
 
 
 def _claim(members: _Members) -> Claim:
