@@ -155,7 +155,9 @@ def described_text(description: TypeDescription) -> bytes:
     top = description["type_description"]
     name = top["type_name"]
     texts = [_described_fields(top)]
-    if not texts[0] and TypeName.parse(name).namespace != "msg":  # else nothing would be taken for no definition
+    if (
+        not texts[0] and TypeName.parse(name).namespace != "msg"
+    ):  # else nothing would be taken for no definition
         texts.insert(0, f"{'=' * 80}\nMSG: {name}\n")
     for each in description["referenced_type_descriptions"]:
         texts.append(f"{'=' * 80}\nMSG: {_described_name(each['type_name'])}\n{_described_fields(each)}")

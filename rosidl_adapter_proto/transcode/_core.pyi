@@ -83,9 +83,6 @@ def read_file_descriptor_set(data: bytes, type_name: str) -> tuple[bytes, list[_
         ValueError: The set is damaged or too large, or does not have the message.
     """
 
-KEPT_FAILURES: int
-"""Of how many messages of a chunk that fail it is told which they are."""
-
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""
 

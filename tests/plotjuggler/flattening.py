@@ -50,10 +50,14 @@ def flatten_protobuf(message: Message, prefix: str = "") -> Iterator[FlatPair]:
     """Yield the pairs of any protobuf message, from its descriptor."""
     for field in message.DESCRIPTOR.fields:
         key, value = f"{prefix}/{field.name}", getattr(message, field.name)
-        entry = field.message_type if field.message_type and field.message_type.GetOptions().map_entry else None
+        entry = (
+            field.message_type if field.message_type and field.message_type.GetOptions().map_entry else None
+        )
         if entry:
             for name in value:
-                yield from _flatten_protobuf_value(value[name], entry.fields_by_name["value"], f"{key}/{name}")
+                yield from _flatten_protobuf_value(
+                    value[name], entry.fields_by_name["value"], f"{key}/{name}"
+                )
         elif _is_repeated(field):
             if len(value) <= LONGEST_ARRAY:
                 for index, each in enumerate(value):

@@ -42,7 +42,7 @@ def flattened(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Collected
                 message = ros_object(types, name, random_value(types, name, rng))
                 writer.add_message(channel, time, serialization.serialize_message(message), time)
                 add(expected, f"/{name}", time, flatten_ros(message))
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return path, expected
 
 
@@ -60,11 +60,10 @@ def difference(found: Iterable[Series], expected: Collected) -> list[object]:
     for series in found:
         key = series.topic, series.key, series.type_name
         times, values = missing.pop(key, ([], []))
-        if not isinstance(series.values, list):
-            values = numpy.array(values, series.values.dtype)
-            is_same = series.values.tobytes() == values.tobytes()
-        else:
+        if isinstance(series.values, list):
             is_same = series.values == values
+        else:
+            is_same = series.values.tobytes() == numpy.array(values, series.values.dtype).tobytes()
         if series.times.tolist() != times or not is_same:
             wrong.append((key, series.times, series.values, times, values))
     return [*wrong, *missing.items()]
