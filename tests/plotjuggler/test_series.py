@@ -112,8 +112,12 @@ def test_series_of_imu(path: Path) -> None:
         (["/joint_states/velocity"], [f"/joint_states/velocity[{each}]" for each in range(12)]),
         (["/joint_states/effort[1?]"], ["/joint_states/effort[10]", "/joint_states/effort[11]"]),
         (
-            ["/*/header/frame_id"],
-            ["/imu/header/frame_id", "/joint_states/header/frame_id", "/scan/header/frame_id"],
+            ["/*s*/header/frame_id"],
+            [
+                "/joint_states/header/frame_id",
+                "/scan/header/frame_id",
+                *(f"/tf/transforms[{each}]/header/frame_id" for each in range(6)),
+            ],
         ),
         (["/imu/angular*/z", "/scan/scan_time"], ["/imu/angular_velocity/z", "/scan/scan_time"]),
     ],
