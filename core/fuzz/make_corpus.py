@@ -1,4 +1,4 @@
-"""Write what fuzzing begins with: plans of types that have every kind of field, and valid messages of them.
+"""Write what fuzzing begins with: plans of types that have every kind of field, valid messages of them, and schemas.
 
     python core/fuzz/make_corpus.py DIRECTORY
 
@@ -30,6 +30,14 @@ CHOSEN = (
     ("test/msg/Fixed", ["c"]),
 )
 """Types and the fields that are read of them."""
+RULE = "=" * 80
+TEXTS = (
+    f"Header header\ntime stamp\nPart[<=3] parts\n{RULE}\nMSG: std_msgs/Header\nstring frame_id\n"
+    f"{RULE}\nMSG: test/Part\nother/Empty[2] nothing\n{RULE}\nMSG: other/Empty\n",
+    "string<=5[] a\r\nwstring<=4[] b\n\tint8 A = 1 # one\nfloat64[3] c [1, 2, 3]\nchar d\nbyte[] e\nbool f true\n",
+    f"{RULE}\nMSG: Root\nint64 plumless\nuint8 buckeroo\n{RULE}\nMSG: test/msg/Root\nint64 plumless\nuint8 buckeroo",
+)
+"""Definitions of `test/msg/Root`."""
 
 
 def sized(content: bytes) -> bytes:
@@ -78,6 +86,8 @@ def main(directory: Path) -> None:
                     contents["chunk"] = b"\5" + chunk(number, cdr, cdr, proto, ros1)
                 for kind, content in contents.items():
                     (inputs / f"{number}_{kind}_{i}").write_bytes(content)
+    for number, text in enumerate(TEXTS):
+        (inputs / f"text_{number}").write_bytes(b"\6" + text.encode())
     (directory / "plans.bin").write_bytes(b"".join(map(sized, plans)))
 
 

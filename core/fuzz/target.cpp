@@ -1,4 +1,4 @@
-// The fuzz target: all directions, plans themselves, and chunks of messages.
+// The fuzz target: all directions, plans themselves, chunks of messages, and schemas.
 //
 // The first byte of an input says what to do with the rest:
 //   0  the number of a plan, and then a CDR message; 1  the same with a protobuf message
@@ -6,6 +6,7 @@
 //   message
 //   4  the number of a plan, and then a message of ROS 1
 //   5  a chunk, in which each topic id is the number of a plan and a way to treat its messages
+//   6  the text of the type test/msg/Root
 // The plans with numbers are in the file that the environment variable ROSIDL_PROTO_FUZZ_PLANS names, each
 // with its size before it. make_corpus.py writes that file and inputs to begin with.
 #include <cstdio>
@@ -16,6 +17,7 @@
 #include "columns.hpp"
 #include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
+#include "rosidl_adapter_proto/schema.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 
@@ -330,6 +332,17 @@ void run_chunk(const std::vector<Plan>& plans, Input chunk) {
   check(failed == 0, "failures are not counted");
 }
 
+// What is read of a schema is a plan, though its messages may be too large for one.
+void run_text(Input text) {
+  std::vector<uint8_t> packed;
+  const std::string_view view(reinterpret_cast<const char*>(text.data), text.size);
+  const char* wrong = read_ros2msg(view, "test/msg/Root", &packed);
+  check((wrong != nullptr) == packed.empty(), "a text is neither read nor refused");
+  Plan plan;
+  if (wrong != nullptr || (wrong = plan.load(packed.data(), packed.size())) == nullptr) return;
+  check(std::string_view(wrong) == "a message of this type is larger than 2 GiB", wrong);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -347,6 +360,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     run_ros1(plans[data[1] % plans.size()], {data + 2, size - 2});
   } else if (mode == 5) {
     run_chunk(plans, {data + 1, size - 1});
+  } else if (mode == 6) {
+    run_text({data + 1, size - 1});
   }
   return 0;
 }

@@ -51,10 +51,11 @@ TEST(ways_to_write_the_same_type) {
 }
 
 TEST(texts_that_are_not_valid_say_why) {
-  const char* const kType = "a field or constant does not have a type of .msg";
-  const char* const kCount = "the length of an array or a bound is not a whole number from 1 to 4294967295";
-  const char* const kField = "a field does not have a name of letters, digits and underscores";
-  const char* const kTwice = "a definition has two fields or two constants with the same name";
+  constexpr const char* kType = "a field or constant does not have a type of .msg";
+  constexpr const char* kCount =
+      "the length of an array or a bound is not a whole number from 1 to 4294967295";
+  constexpr const char* kField = "a field does not have a name of letters, digits and underscores";
+  constexpr const char* kTwice = "a definition has two fields or two constants with the same name";
   const Case cases[] = {
       {"int8", "a line does not have both a type and a name"},
       {"int8 a-b", kField},
@@ -105,7 +106,7 @@ TEST(texts_that_are_not_valid_say_why) {
 }
 
 TEST(types_that_no_text_can_have) {
-  const char* const kName = "the type does not have a name such as sensor_msgs/msg/Imu";
+  constexpr const char* kName = "the type does not have a name such as sensor_msgs/msg/Imu";
   for (const char* type : {"", "B", "a/", "/B", "a/b/C", "a/msg/b/C", "a/msg/B ", "1/B", "a.msg.B"}) {
     CHECK_EQUAL(wrong("int8 a", type), kName);
   }
@@ -148,10 +149,10 @@ TEST(names_that_are_made_to_collide_are_refused) {
   for (int i = 0; i < 128; ++i) {
     fields += "int8 ";
     for (int bit = 0; bit < 7; ++bit) fields += pieces[i >> bit & 1];
-    fields += "\n";
+    fields += '\n';
   }
   CHECK_EQUAL(wrong(fields, "a/B"), "too many fields of a message have names with the same hash");
-  CHECK_EQUAL(wrong(fields.substr(0, 64 * 62), "a/B"), "");
+  CHECK_EQUAL(wrong(fields.substr(0, size_t{64} * 62), "a/B"), "");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,14 +18,15 @@ from rosidl_adapter_proto.bags.model import Selection, Statistics, StoredChunk, 
 from rosidl_adapter_proto.bags.order import Run, in_time_order
 from rosidl_adapter_proto.bags.pipeline import map_in_order
 from rosidl_adapter_proto.bags.recording import Recording, find_recording
-from rosidl_adapter_proto.bags.storage import StorageReader
+from rosidl_adapter_proto.bags.storage import SALVAGE, StorageReader
 from rosidl_adapter_proto.bags.topic_names import no_such_topic
 from rosidl_adapter_proto.bags.types import BagTypes
-from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.bags.warning_list import WarningList
+from rosidl_adapter_proto.errors import BagError, RequestError
 from rosidl_adapter_proto.schema.registry import Schema
 from rosidl_adapter_proto.time import to_nanoseconds
 from rosidl_adapter_proto.transcode.plan import chosen_names
-from rosidl_adapter_proto.transcode.records import Records
+from rosidl_adapter_proto.transcode.records import Records, read_records
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.time import Time
@@ -68,16 +70,28 @@ class Bag:
     Attributes:
         path: The folder or the file.
         recording: Its files, as they are stored.
+        salvage: Whether what can be read of a damaged file is read.
 
     Args:
         recording: Its files, as they are stored.
         include: Folders that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else.
+        salvage: Read what can be read of a damaged file.
     """
 
-    def __init__(self, recording: Recording, include: Iterable[Path] = (), distro: str | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        include: Iterable[Path] = (),
+        distro: str | None = None,
+        *,
+        salvage: bool = False,
+    ) -> None:
         self.path = recording.path
         self.recording = recording
+        self.salvage = salvage
+        self._warnings = WarningList()
+        self._is_damaged = False
         self._include = tuple(include)
         self._distro = distro
         self._closed = False
@@ -136,8 +150,14 @@ class Bag:
 
     @property
     def warnings(self) -> Sequence[str]:
-        """What is odd about the bag and the types that were asked for so far, for people."""
-        return [*self._contents[1], *self.types.warnings]
+        """What is odd about the bag, and about the messages and types that were asked for so far, for people."""
+        return list(dict.fromkeys([*self._contents[1], *self._warnings, *self.types.warnings]))
+
+    @property
+    def is_damaged(self) -> bool:
+        """Whether something could not be read so far, as `warnings` say."""
+        self._contents  # noqa: B018
+        return self._is_damaged
 
     @cached_property
     def types(self) -> BagTypes:
@@ -152,10 +172,27 @@ class Bag:
             topic: The name of the topic.
 
         Raises:
-            BagError: There is no such topic, or nothing is known of its type.
+            BagError: Nothing is known of its type.
+            RequestError: There is no such topic.
         """
         (name,) = self._names(topic)
         return self.types.schema(self.topics[name])
+
+    @contextmanager
+    def open_file(self, index: int) -> Iterator[StorageReader]:
+        """Open a file; what is odd about what is read of it is among `warnings` afterwards.
+
+        Args:
+            index: Which of `files`.
+
+        Raises:
+            BagError: It cannot be read.
+        """
+        with self.recording.open(index, self.salvage) as reader:
+            try:
+                yield reader
+            finally:
+                self._note(reader)
 
     def messages(
         self,
@@ -178,7 +215,8 @@ class Bag:
                 empty in the messages.
 
         Raises:
-            BagError: There is no such topic; or, while messages are read, a file is damaged.
+            BagError: While messages are read: a file is damaged.
+            RequestError: There is no such topic.
             SchemaError: A topic does not have one of the fields.
             TypeError: A time is none, or `fields` is one text.
         """
@@ -211,7 +249,8 @@ class Bag:
             For each run of messages, the open file that it is in and the run.
 
         Raises:
-            BagError: There is no such topic; or, while messages are read, a file is damaged.
+            BagError: While messages are read: a file is damaged.
+            RequestError: There is no such topic.
             TypeError: A time is none.
         """
         names = frozenset(self._names(topics))
@@ -229,22 +268,27 @@ class Bag:
             if not ids or after or before:
                 continue
             self._check_open()
-            with self.recording.open(index) as reader:
+            with self.open_file(index) as reader:
                 found = 0
                 for run in self._file_runs(reader, Selection(ids, start_time, end_time), threads):
                     found += len(run.indexes)
                     yield reader, run
             said = sum(file.statistics.message_counts.get(each, 0) for each in ids)
             if found != said and not start_time and end_time is None:
-                raise BagError(
-                    f"{file.path}: it says that there are {said} messages of these topics, but {found} were found; "
-                    "`bag convert --on-error skip` makes a bag of those"
+                self._damaged(
+                    f"{file.path}: it says that there are {said} messages of these topics, but {found} were found",
+                    f"{SALVAGE} those",
                 )
 
     def _file_runs(self, reader: StorageReader, selection: Selection, threads: int) -> Iterator[Run]:
         def read(chunk: StoredChunk) -> Records:
             self._check_open()
-            return read_chunk(chunk, selection)
+            self._note(reader)
+            try:
+                return read_chunk(chunk, selection)
+            except BagError as error:
+                self._damaged(str(error), f"{SALVAGE} what is whole")
+                return read_records(b"")
 
         chunks = reader.chunks(selection, in_time_order=True)
         if threads == 1:
@@ -288,16 +332,17 @@ class Bag:
                 )
 
     def _source(self, path: str, topic: Topic, fields: Sequence[str] | None) -> MessageSource:
-        return MessageSource(path, topic, lambda: decoder(topic, self.types, fields))
+        return MessageSource(path, topic, lambda: self.types, fields)
 
     @cached_property
     def _contents(self) -> tuple[Sequence[BagFile], Sequence[str]]:
         """The files, and what is odd about them; each is opened for it once."""
         self._check_open()
         files, warnings = [], list(self.recording.warnings)
-        for reader in self.recording.readers():
+        for reader in self.recording.readers(self.salvage):
             files.append(BagFile(reader.path, reader.storage, reader.topics, reader.statistics))
             warnings.extend(reader.warnings)
+            self._is_damaged |= reader.is_damaged
         warnings += self.recording.count_warnings(sum(file.statistics.message_count for file in files))
         types: dict[str, set[str]] = {}
         for topic in (topic for file in files for topic in file.topics.values()):
@@ -306,6 +351,19 @@ class Bag:
             if len(several) > 1:
                 warnings.append(f"{self.path}: topic {name} has several types: {', '.join(sorted(several))}")
         return tuple(files), tuple(dict.fromkeys(warnings))
+
+    def _note(self, reader: StorageReader) -> None:
+        """Note what a reader has found to be odd."""
+        self._is_damaged |= reader.is_damaged
+        for each in reader.warnings:
+            self._warnings.add(each)
+
+    def _damaged(self, reason: str, advice: str) -> None:
+        """Raise an error, unless what can be read is to be read."""
+        if not self.salvage:
+            raise BagError(f"{reason}; {advice}")
+        self._is_damaged = True
+        self._warnings.add(reason)
 
     @property
     def _statistics(self) -> list[Statistics]:
@@ -316,7 +374,7 @@ class Bag:
         names = [topics] if isinstance(topics, str) else list(topics)
         for name in names:
             if name not in self.topics:
-                raise BagError(f"{self.path}: {no_such_topic(name, self.topics)}")
+                raise RequestError(f"{self.path}: {no_such_topic(name, self.topics)}")
         return names
 
     def _check_open(self) -> None:
@@ -329,6 +387,7 @@ def open_bag(
     *,
     include: Iterable[str | os.PathLike[str]] = (),
     distro: str | None = None,
+    salvage: bool = False,
 ) -> Bag:
     """Open a bag for reading.
 
@@ -337,6 +396,8 @@ def open_bag(
         include: Folders of packages that have the definitions that the bag does not have.
         distro: The ROS distribution of the embedded store, for definitions that are nowhere else; by default
             `$ROS_DISTRO`, else the newest.
+        salvage: Of a file that was cut off or is damaged, read what is whole, and say in `Bag.warnings` what is not:
+            the same as `bag convert --on-error skip` does. By default, damage is an error.
 
     Returns:
         The bag. Its messages are read when somebody goes through them.
@@ -346,6 +407,6 @@ def open_bag(
         PlaceError: The place that a URL names cannot be reached.
         RequestError: There is nothing installed that knows the URL.
     """
-    bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in include], distro)
+    bag = Bag(find_recording(os.fspath(path)), [Path(each) for each in include], distro, salvage=salvage)
     bag.files  # noqa: B018  # what is wrong with a file is said here
     return bag

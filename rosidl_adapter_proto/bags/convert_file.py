@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from rosidl_adapter_proto.bags.chunks import ConvertedChunk, chunk_converter, convert_chunk
-from rosidl_adapter_proto.bags.compression import ZSTD
+from rosidl_adapter_proto.bags.compression import NONE
 from rosidl_adapter_proto.bags.conversion import ConversionResult, OnError, Settings
 from rosidl_adapter_proto.bags.description import WrittenFile, describe
 from rosidl_adapter_proto.bags.labels import label_warnings
@@ -117,16 +117,13 @@ def _open_writer(task: FileTask, reader: StorageReader) -> StorageWriter:
 
 def _compression(task: FileTask, reader: StorageReader) -> str:
     """Return how to compress: as the user says, or as the source is, whatever of it is compressed."""
-    asked, metadata = task.settings.compression, task.recording.metadata
+    asked = task.settings.compression
     if asked is not None:
-        return "" if asked == "none" else asked
-    if task.recording.files[task.index].compressed or (metadata and metadata.compression_mode):
-        return ZSTD
+        return NONE if asked == "none" else asked
     try:
-        first = next(reader.chunks(), None)
+        return task.recording.compression(task.index, reader).name
     except BagError:  # those who convert the chunks will say so
-        first = None
-    return first.compression if first else ""
+        return NONE
 
 
 class _FileConversion:

@@ -69,9 +69,8 @@ def bag_information(bag: Bag) -> BagInformation:
     warnings: dict[str, None] = {}
     for index, file in enumerate(bag.files):
         try:
-            with bag.recording.open(index) as reader:
-                first = next(iter(reader.chunks()), None)
-                compressions[_compression(bag, index) or (first.compression if first else "")] = None
+            with bag.open_file(index) as reader:
+                compressions[str(bag.recording.compression(index, reader))] = None
                 warnings.update(dict.fromkeys(label_warnings(reader, file.topics)))
         except BagError as error:
             warnings[str(error)] = None
@@ -87,14 +86,6 @@ def bag_information(bag: Bag) -> BagInformation:
         topics=topics,
         warnings=list(dict.fromkeys([*bag.warnings, *warnings])),
     )
-
-
-def _compression(bag: Bag, index: int) -> str:
-    """Return what rosbag2 itself has compressed, a whole file or each message; empty if it did not."""
-    metadata = bag.recording.metadata
-    if bag.recording.files[index].compressed:
-        return "zstd (whole files)"
-    return f"{metadata.compression_format} (each message)" if metadata and metadata.compression_mode else ""
 
 
 def _topic_information(bag: Bag, topic: BagTopic, warnings: dict[str, None]) -> BagTopicInformation:

@@ -23,11 +23,9 @@ from rosidl_adapter_proto.bags.mcap_contents import (
 from rosidl_adapter_proto.bags.mcap_records import KNOWN_OPCODES, MAGIC, ChunkPlace, McapFile, RecordPlace
 from rosidl_adapter_proto.bags.mcap_topics import read_topics
 from rosidl_adapter_proto.bags.model import EVERYTHING, Attachment, Selection, StoredChunk
-from rosidl_adapter_proto.bags.storage import MCAP
+from rosidl_adapter_proto.bags.storage import MCAP, SALVAGE
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
-
-_SALVAGE = "`bag convert --on-error skip` reads"
 
 _Chunk = TypeVar("_Chunk", ChunkPlace, StoredChunk)
 
@@ -166,7 +164,7 @@ class McapReader:
         contents = scan(self._file, damages.append)
         count = contents.statistics.message_count
         if damages and not self._salvage:
-            raise BagError(f"{damages[0]}; {count} messages are whole, and {_SALVAGE} them") from damages[0]
+            raise BagError(f"{damages[0]}; {count} messages are whole, and {SALVAGE} them") from damages[0]
         self.warnings.add(f"{self.path}: {why}; it was searched, and {count} messages were found")
         for error in damages:
             self._damaged(error)
@@ -175,7 +173,7 @@ class McapReader:
     def _damaged(self, error: BagError) -> None:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
-            raise BagError(f"{error}; {_SALVAGE} what is whole") from error
+            raise BagError(f"{error}; {SALVAGE} what is whole") from error
         self.is_damaged = True
         self.warnings.add(str(error))
 

@@ -2,43 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import cached_property
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any
 
 from google.protobuf.message import Message
 
-from rosidl_adapter_proto.bags.decoding import Decode
-from rosidl_adapter_proto.bags.model import Topic, message_place
+from rosidl_adapter_proto.bags.decoding import Decode, decoder
+from rosidl_adapter_proto.bags.model import PROTOBUF, Topic, message_place
+from rosidl_adapter_proto.bags.types import BagTypes
 from rosidl_adapter_proto.errors import BagError, ConversionError
 
 
 @dataclass
 class MessageSource:
-    """Where messages come from: a topic in a file.
+    """Where messages come from: a topic in a file. Pickled, it has the definition of its type and no bag.
 
     Attributes:
         path: The file, for people.
         topic: The topic.
-        decoder: Returns what makes messages of bytes; asked once, when the first message is wanted.
+        types: Returns the types of the bag; asked when the first message is wanted.
+        fields: Only these fields are in the messages; None for all.
         numbers: Counts the messages.
     """
 
     path: str
     topic: Topic
-    decoder: Callable[[], Decode]
+    types: Callable[[], BagTypes]
+    fields: Sequence[str] | None = None
     numbers: Iterator[int] = field(default_factory=lambda: count(1))
 
     @cached_property
     def decode(self) -> Decode:
         """Makes messages of bytes."""
-        return self.decoder()
+        return decoder(self.topic, self.types(), self.fields)
+
+    def __reduce__(self) -> tuple[Callable[..., MessageSource], tuple[Any, ...]]:
+        topic = self.topic
+        name = "ros_definition" if topic.serialization_format == PROTOBUF else "definition"
+        if not getattr(topic, name).encoding:
+            with contextlib.suppress(BagError):  # then its messages cannot be decoded there either
+                found: dict[str, Any] = {name: self.types().ros_definition(topic)}
+                topic = replace(topic, **found)
+        values = (getattr(topic, each) for each in _DECISIVE)
+        return _source, (self.path, None if self.fields is None else tuple(self.fields), *values)
+
+
+_DECISIVE = (
+    "name",
+    "type_name",
+    "serialization_format",
+    "definition",
+    "ros_definition",
+    "schema_name",
+    "type_hash",
+)
+"""What of a topic decides its type: all but what the recording says besides."""
+
+
+@lru_cache(maxsize=1000)
+def _source(path: str, fields: Sequence[str] | None, *values: Any) -> MessageSource:
+    """Return the source of messages that were pickled: the same one for all that come one by one."""
+    topic = Topic(**dict(zip(_DECISIVE, values, strict=True)))
+    return MessageSource(path, topic, lambda: BagTypes([topic]), fields)
 
 
 class BagMessage:
     """A message of a bag. It unpacks as `topic, message, log_time`.
+
+    Pickled, it has what was recorded and the definition of its type, of which `message` is made where it is loaded.
 
     Attributes:
         topic: The topic that it was sent to.
@@ -87,6 +122,10 @@ class BagMessage:
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.topic, self.message, self.log_time))
+
+    def __reduce__(self) -> tuple[type[BagMessage], tuple[Any, ...]]:
+        recorded = (self.topic, self.log_time, self.publish_time, self.sequence, self.data)
+        return BagMessage, (*recorded, self._source, self._number)
 
     def __repr__(self) -> str:
         return f"<BagMessage of {self.topic}, recorded at {self.log_time}, {len(self.data)} bytes>"

@@ -79,6 +79,11 @@ class BagMetadata:
     ros_distro: str = ""
     version: int = WRITTEN_VERSION
 
+    @property
+    def compresses_messages(self) -> bool:
+        """Whether each message is compressed by itself."""
+        return self.compression_mode == "MESSAGE"
+
 
 def read_metadata(data: bytes, path: str) -> BagMetadata:
     """Return what metadata.yaml says, or the text inside a file of a bag, which has the same form.

@@ -30,6 +30,7 @@ from rosidl_adapter_proto.bags.storage import (
     MAXIMUM_CHUNK_SIZE,
     MCAP,
     ROSBAG,
+    SALVAGE,
     SQLITE3,
     StorageReader,
 )
@@ -210,7 +211,7 @@ class _OpenedFile:
         if damage is not None:
             self._damages.add(str(damage))
         metadata = metadata or self._inner_metadata(reader)
-        self._messages_compressed = metadata is not None and metadata.compression_mode == "MESSAGE"
+        self._messages_compressed = metadata is not None and metadata.compresses_messages
         if metadata is not None and self._messages_compressed and metadata.compression_format != ZSTD:
             known = f"compressed with {metadata.compression_format!r}; only zstd is known"
             raise BagError(f"{self.path}: its messages are {known}")
@@ -275,7 +276,7 @@ class _OpenedFile:
     def _damaged(self, reason: str) -> None:
         """Raise an error, unless what can be read is to be read."""
         if not self._salvage:
-            raise BagError(f"{reason}; `bag convert --on-error skip` leaves such messages out")
+            raise BagError(f"{reason}; {SALVAGE} the others")
         self._damages.add(reason)
 
     def _inner_metadata(self, reader: StorageReader) -> BagMetadata | None:
@@ -319,7 +320,7 @@ def _with_metadata(
         if differing:
             names = " and ".join(differing)
             contradictions.append(
-                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file"
+                f"{reader.path}: {topic.name}: {METADATA_FILE} says another {names} than the file, which is believed"
             )
     return topics, contradictions
 

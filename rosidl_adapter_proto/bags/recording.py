@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
+from rosidl_adapter_proto.bags.compression import NONE, ZSTD
 from rosidl_adapter_proto.bags.metadata import MAXIMUM_SIZE, METADATA_FILE, BagMetadata, read_metadata
 from rosidl_adapter_proto.bags.places import Place, file_size, find_place
 from rosidl_adapter_proto.bags.recorded_file import (
@@ -21,6 +23,21 @@ from rosidl_adapter_proto.bags.recorded_file import (
 )
 from rosidl_adapter_proto.bags.storage import SUFFIXES, StorageReader
 from rosidl_adapter_proto.errors import BagError
+
+
+class Compression(NamedTuple):
+    """How a file is compressed.
+
+    Attributes:
+        name: With what, as in `COMPRESSIONS`; empty if it is not.
+        of: What rosbag2 has compressed, for people; empty where it is chunks.
+    """
+
+    name: str
+    of: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.of})" if self.of else self.name
 
 
 @dataclass(frozen=True)
@@ -60,6 +77,23 @@ class Recording:
     def size(self) -> int:
         """How many bytes its files have, as they are stored."""
         return sum(file_size(find_place(file.path)) for file in self.files)
+
+    def compression(self, index: int, reader: StorageReader) -> Compression:
+        """Return how a file is compressed, as far as its first chunk says.
+
+        Args:
+            index: Which of `files`.
+            reader: The file, open.
+
+        Raises:
+            BagError: It cannot be read.
+        """
+        if self.files[index].compressed:
+            return Compression(ZSTD, "whole files")
+        if self.metadata and self.metadata.compresses_messages:
+            return Compression(self.metadata.compression_format, "each message")
+        first = next(iter(reader.chunks()), None)
+        return Compression(first.compression if first else NONE)
 
     def open(self, index: int, salvage: bool = False) -> StorageReader:
         """Open a file.

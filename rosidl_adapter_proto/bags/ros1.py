@@ -26,7 +26,7 @@ from rosidl_adapter_proto.bags.model import (
     Topic,
 )
 from rosidl_adapter_proto.bags.ros1_records import Operation, Record, Source, read_fields
-from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, ROSBAG
+from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, ROSBAG, SALVAGE
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
@@ -180,7 +180,12 @@ class Ros1Reader:
             if place == self._source.size:
                 yield from self._loose_chunks(self._source.size)  # as one, since others may lie between
             elif self._selected(place, selection):
-                yield from self._chunk(self._source.record(place))
+                try:
+                    chunk = self._source.record(place)
+                except BagError as error:
+                    self._tolerate(error, "it is left out")
+                else:
+                    yield from self._chunk(chunk)
 
     def _chunk(self, chunk: Record) -> Iterator[StoredChunk]:
         messages = _Messages()
@@ -259,7 +264,7 @@ class Ros1Reader:
             self._add_index(start)
         except BagError as error:
             if not salvage:
-                raise BagError(f"{error}; `bag convert --on-error skip` reads what is whole") from error
+                raise BagError(f"{error}; {SALVAGE} what is whole") from error
             self._contents = _Contents()
             self._tolerant = True
             self._tolerate(error, "read from its beginning, without the index")

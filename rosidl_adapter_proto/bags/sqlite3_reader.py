@@ -27,7 +27,7 @@ from rosidl_adapter_proto.bags.model import (
 )
 from rosidl_adapter_proto.bags.qos import numbered_qos
 from rosidl_adapter_proto.bags.sqlite3_database import open_database, reason_of
-from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, SQLITE3
+from rosidl_adapter_proto.bags.storage import CHUNK_SIZE, SALVAGE, SQLITE3
 from rosidl_adapter_proto.bags.warning_list import WarningList
 from rosidl_adapter_proto.errors import BagError
 from rosidl_adapter_proto.transcode.records import pack_records
@@ -114,7 +114,8 @@ class SqliteReader:
             BagError: A row is not what it should be, or the database is damaged; the message says where.
         """
         done = 0
-        for rows in self._batches(selection, in_time_order):
+        salvaged = self._salvage and in_time_order
+        for rows in self._sorted(selection) if salvaged else self._batches(selection, in_time_order):
             yield from self._chunk(rows, done)
             done += len(rows)
 
@@ -122,9 +123,7 @@ class SqliteReader:
         try:
             return self._connection.execute(query).fetchall()
         except _ERRORS as error:
-            advice = (
-                "; `bag convert --on-error skip` reads what is whole" if "malformed" in str(error) else ""
-            )
+            advice = f"; {SALVAGE} what is whole" if "malformed" in str(error) else ""
             raise BagError(f"{self.path}: {reason_of(error)}{advice}") from None
 
     def _tables(self) -> list[str]:
@@ -221,6 +220,19 @@ class SqliteReader:
         where = " AND ".join(conditions)
         return f"SELECT id, topic_id, timestamp, data FROM messages WHERE {where} ORDER BY {order}", values
 
+    def _sorted(self, selection: Selection) -> Iterator[list[_Row]]:
+        """Yield the rows of a damaged file in the order of the times at which batches of them begin.
+
+        What is whole is found in the order of the table, and then read again.
+        """
+        query, values = self._selecting(selection, in_time_order=False)
+        batches = [
+            (min((row[2] for row in rows if isinstance(row[2], int)), default=0), rows[0][0], len(rows))
+            for rows in self._batches(selection)
+        ]
+        for _, first, count in sorted(batches):
+            yield self._connection.execute(f"{query} LIMIT {count}", [first, *values]).fetchall()
+
     def _batches(self, selection: Selection, in_time_order: bool = False) -> Iterator[list[_Row]]:
         """Yield the rows of a selection; in the order of the table, damaged ones are left out to salvage a file."""
         query, values = self._selecting(selection, in_time_order)
@@ -249,9 +261,11 @@ class SqliteReader:
                 first = rows[-1][0] + 1
             if not reason:
                 return
-            if not self._salvage or in_time_order:
+            if not self._salvage:
                 where = f"{self.path}: table messages, from row {first} on"
-                raise BagError(f"{where}: {reason}; {done} messages before it were read")
+                raise BagError(
+                    f"{where}: {reason}; {done} messages before it were read, and {SALVAGE} all that is whole"
+                )
             row = self._first_row(query, first, values)
             if row:  # Python asks for the row after a good one before it gives that
                 yield [row]

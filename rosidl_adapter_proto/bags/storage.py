@@ -21,6 +21,9 @@ SUFFIXES: Mapping[str, str] = {".mcap": MCAP, ".db3": SQLITE3, ".bag": ROSBAG}
 WRITTEN_SUFFIXES: Mapping[str, str] = {MCAP: ".mcap", SQLITE3: ".db3"}
 """What the names of files end with, by the storages that are written."""
 
+SALVAGE = "`bag convert --on-error skip`, elsewhere `--salvage`, reads"
+"""What errors advise where there is something left to read, for people."""
+
 CHUNK_SIZE = 2**20
 """About how many bytes of messages make a chunk, where the storage has none."""
 

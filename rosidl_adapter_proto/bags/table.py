@@ -61,8 +61,9 @@ def table_reader(
         maximum_bytes: A record batch ends with the row with which it has so many bytes.
 
     Raises:
-        BagError: There is no such topic, or nothing is known of its type; or, while messages are read, a file is
-            damaged or a message is not valid.
+        BagError: Nothing is known of the type of the topic; or, while messages are read, a file is damaged or a message
+            is not valid.
+        RequestError: There is no such topic.
         SchemaError: The type has no such field.
         TypeError: A time is none, or `fields` is one text.
     """

@@ -93,6 +93,14 @@ def bag_source_options(command: Command) -> Command:
     return include(setting_option("distro")(command))
 
 
+def salvage_option(command: Command) -> Command:
+    """Add the option that reads damaged bags as well."""
+    help_text = (
+        "Read what is whole of a damaged or cut off file. What is not is told, and the exit code is 1."
+    )
+    return click.option("--salvage", is_flag=True, help=help_text)(command)
+
+
 _TIME = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?(Z|[+-]\d\d:\d\d)?")
 
 

@@ -5,10 +5,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import click
 
+if TYPE_CHECKING:
+    from rosidl_adapter_proto.bags.bag import Bag
+
 _UNITS = ("B", "kB", "MB", "GB", "TB", "PB")
+
+
+EXIT_INCOMPLETE = 1
+"""The exit code of what is done with a bag if something of it was left out."""
 
 
 def show_warnings(warnings: Iterable[str]) -> None:
@@ -17,10 +25,16 @@ def show_warnings(warnings: Iterable[str]) -> None:
         click.echo(f"Warning: {warning}", err=True)
 
 
+def show_bag_warnings(bag: Bag) -> int:
+    """Print what the user should know about a bag that was read, and return the exit code."""
+    show_warnings(bag.warnings)
+    return EXIT_INCOMPLETE if bag.is_damaged else 0
+
+
 def size_text(size: float) -> str:
     """Return a number of bytes as people read it."""
     unit = 0
-    while size >= 1000 and unit < len(_UNITS) - 1:
+    while size >= 999.5 and unit < len(_UNITS) - 1:
         size /= 1000
         unit += 1
     digits = 0 if unit == 0 or size >= 99.95 else 1

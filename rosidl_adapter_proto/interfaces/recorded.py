@@ -75,11 +75,15 @@ def recorded_definitions(data: bytes, encoding: str, type_name: str, where: str)
     text = data.decode(errors="replace").removeprefix("\ufeff").replace("\r\n", "\n")
     found: dict[TypeName, _Section] = {}
     for section in _sections(text, encoding, type_name, where):
-        other = found.setdefault(section.name, section)
-        if not other.text:  # rosbag2 leaves an empty section where it found no .msg, before that of the .idl
-            found[section.name] = section
-        elif section.text and section.text.split() != other.text.split():
-            raise DefinitionError(f"{where}: {section.name} is defined twice, not in the same way")
+        other = found.get(section.name)
+        if (
+            other is None or section.text
+        ):  # rosbag2 has an empty section where it found no .msg, beside that of the .idl
+            if other and other.text and section.text.split() != other.text.split():
+                raise DefinitionError(f"{where}: {section.name} is defined twice, not in the same way")
+            found[section.name] = (
+                section  # compared with the next one, so that a long one is looked at only twice
+            )
         if len(found) > MAXIMUM_DEFINITIONS:
             raise DefinitionError(f"{where}: the definition has more than {MAXIMUM_DEFINITIONS} types")
     return {

@@ -73,9 +73,9 @@ def read_series(
         progress: Called with a number of messages once they are parsed.
 
     Raises:
-        BagError: The bag is damaged, has no such topic, or none that the plugin takes.
+        BagError: The bag is damaged.
         PluginError: Our plugins cannot be found or built.
-        RequestError: No series has one of the names.
+        RequestError: The bag has no such topic, no series of one of the names, or nothing that the plugin takes.
         TypeError: A time is none, or `topics` or `fields` is one text.
     """
     names = SeriesNames(fields)
@@ -107,8 +107,8 @@ def chosen_topics(
         plugin: As for `read_series`.
 
     Raises:
-        BagError: There is no topic of a name or a pattern, none that can have such a series, or none that the plugin
-            takes.
+        RequestError: There is no topic of a name or a pattern, none that can have such a series, or none that the
+            plugin takes.
         TypeError: `topics` is one text.
     """
     if isinstance(topics, str):
@@ -116,15 +116,15 @@ def chosen_topics(
     patterns = list(topics)
     for pattern in patterns:
         if not any(is_named(name, [pattern]) for name in bag.topics):
-            raise BagError(f"{bag.path}: {no_such_topic(pattern, bag.topics)}")
+            raise RequestError(f"{bag.path}: {no_such_topic(pattern, bag.topics)}")
     named = [name for name in bag.topics if not patterns or is_named(name, patterns)]
     chosen = [name for name in named if names.may_be_of(name)]
     if named and not chosen:
-        raise BagError(f"{bag.path}: no topic has such series; there are {', '.join(named)}")
+        raise RequestError(f"{bag.path}: no topic has such series; there are {', '.join(named)}")
     parsed = [name for name in chosen if plugin is None or is_for(plugin, bag.topics[name])]
     if chosen and not parsed:
         found = sorted({each for name in chosen for each in encodings(bag.topics[name]) if each})
-        raise BagError(f"{bag.path}: the plugin is for other topics than these, which are {', '.join(found)}")
+        raise RequestError(f"{bag.path}: the plugin is for other topics than these, which are {', '.join(found)}")
     return parsed
 
 

@@ -33,8 +33,10 @@ def original(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(changes=CHANGES, kept=st.sampled_from([1.0, 1.0, 0.5, 0.9]))
-def test_only_our_errors_come_out(original: Path, tmp_path: Path, changes: list[Change], kept: float) -> None:
+@given(changes=CHANGES, kept=st.sampled_from([1.0, 1.0, 0.5, 0.9]), salvage=st.booleans())
+def test_only_our_errors_come_out(
+    original: Path, tmp_path: Path, changes: list[Change], kept: float, salvage: bool
+) -> None:
     data = bytearray(original.read_bytes())
     for place, replacement in changes:
         at = int(place * len(data))
@@ -42,7 +44,7 @@ def test_only_our_errors_come_out(original: Path, tmp_path: Path, changes: list[
     path = tmp_path / original.name
     path.write_bytes(data[: int(kept * len(data))])
 
-    with contextlib.suppress(Error), open_bag(path) as bag:
+    with contextlib.suppress(Error), open_bag(path, salvage=salvage) as bag:
         for count, recorded in enumerate(bag.messages()):
             assert count < len(data)
             with contextlib.suppress(Error):

@@ -339,7 +339,7 @@ def test_reading_finds_another_number_of_messages() -> None:
         list(open_bag("in.mcap").messages("/a"))
     assert str(caught.value) == (
         "in.mcap: it says that there are 9 messages of these topics, but 8 were found; "
-        "`bag convert --on-error skip` makes a bag of those"
+        "`bag convert --on-error skip`, elsewhere `--salvage`, reads those"
     )
     assert len(list(open_bag("in.mcap").messages("/a", start=1))) == 8
 
@@ -347,7 +347,7 @@ def test_reading_finds_another_number_of_messages() -> None:
 def test_a_truncated_file() -> None:
     whole = mcap_bytes(strings("/a", 40), compression=CompressionType.NONE)
     cut = whole[: len(whole) // 2]
-    assert "`bag convert --on-error skip` reads" in refused(cut)
+    assert "`bag convert --on-error skip`, elsewhere `--salvage`, reads" in refused(cut)
 
     result = convert(cut, on_error="skip")
     found = contents(Path("out.mcap")).messages

@@ -69,7 +69,7 @@ TENTH = places(LOOSE, Opcode.MESSAGE)[9]
 STATISTICS = places(FILE, Opcode.STATISTICS)[0]
 NO_END = "the recording was not finished: it has no end; it was searched, and"
 NOT_USED = "the summary is not used; it was searched, and"
-SKIP = "`bag convert --on-error skip` reads what is whole"
+SKIP = "`bag convert --on-error skip`, elsewhere `--salvage`, reads what is whole"
 
 
 @pytest.mark.parametrize(
@@ -119,21 +119,21 @@ DAMAGES = {
     "cut in a chunk": Damage(
         FILE[: FOURTH.start + 50],
         "a.mcap at byte 1934: a Chunk record has 481 bytes, of which only 41 are there",
-        advice="; 19 messages are whole, and `bag convert --on-error skip` reads them",
+        advice="; 19 messages are whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them",
         count=19,
         before=[f"a.mcap: {NO_END} 19 messages were found"],
     ),
     "cut in the head of a record": Damage(
         FILE[: FOURTH.start + 5],
         "a.mcap at byte 1934: 5 bytes are too few for a record",
-        advice="; 19 messages are whole, and `bag convert --on-error skip` reads them",
+        advice="; 19 messages are whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them",
         count=19,
         before=[f"a.mcap: {NO_END} 19 messages were found"],
     ),
     "cut in a message": Damage(
         LOOSE[: TENTH.start + 20],
         "a.mcap at byte 863: a Message record has 41 bytes, of which only 11 are there",
-        advice="; 9 messages are whole, and `bag convert --on-error skip` reads them",
+        advice="; 9 messages are whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them",
         count=9,
         before=[f"a.mcap: {NO_END} 9 messages were found"],
     ),
@@ -152,7 +152,7 @@ DAMAGES = {
     "zeros instead of the end": Damage(
         FILE[: FOURTH.start] + bytes(5000),
         "a.mcap at byte 1934: there is no record, its first byte is 0",
-        advice="; 19 messages are whole, and `bag convert --on-error skip` reads them",
+        advice="; 19 messages are whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them",
         count=19,
         before=[f"a.mcap: {NO_END} 19 messages were found"],
     ),
@@ -178,7 +178,7 @@ DAMAGES = {
         insert(LOOSE, TENTH.start, b"garbage" * 20)[:-400],
         "a.mcap at byte 863: a record of the unknown kind 0x67 has 7018690038970085985 bytes, of"
         " which only 2452 are there",
-        advice="; 40 messages are whole, and `bag convert --on-error skip` reads them",
+        advice="; 40 messages are whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them",
         before=[f"a.mcap: {NO_END} 40 messages were found"],
     ),
     "a length that points outside": Damage(
@@ -381,7 +381,7 @@ def test_no_more_memory_is_taken_than_a_record_may_need(tmp_path: Path) -> None:
         McapReader(file, "a.mcap")
     assert str(caught.value) == (
         "a.mcap at byte 33: a Channel record has 134217728 bytes; up to 67108864 are read;"
-        " 0 messages are whole, and `bag convert --on-error skip` reads them"
+        " 0 messages are whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them"
     )
 
 
@@ -437,7 +437,9 @@ def test_a_file_cut_anywhere(data: bytes, part: float) -> None:
     try:
         assert list(messages_of(reader_of(data[:size]))) == found
     except BagError as error:
-        assert str(error).endswith(("and `bag convert --on-error skip` reads them", SKIP))
+        assert str(error).endswith(
+            ("and `bag convert --on-error skip`, elsewhere `--salvage`, reads them", SKIP)
+        )
 
 
 CHANGES = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(1, 255)), min_size=1, max_size=5)

@@ -218,7 +218,7 @@ def _with_chunk(chunk: bytes) -> bytes:
     return header + chunk + b"".join(CONNECTIONS)
 
 
-SALVAGE = "; `bag convert --on-error skip` reads what is whole"
+SALVAGE = "; `bag convert --on-error skip`, elsewhere `--salvage`, reads what is whole"
 WRONG = {
     "another version": (
         b"#ROSBAG V1.2\n" + BAG[13:],

@@ -325,7 +325,10 @@ def test_damaged_pages_are_an_error_that_says_how_far_it_got(tmp_path: Path) -> 
     with SqliteReader(str(path)) as reader, pytest.raises(BagError) as caught:
         rows_of(reader)
     first = lost[0] - 1  # sqlite3 of Python looks ahead
-    reason = f"sqlite3 says: database disk image is malformed; {first - 1} messages before it were read"
+    reason = (
+        f"sqlite3 says: database disk image is malformed; {first - 1} messages before it were read, and `bag convert "
+        "--on-error skip`, elsewhere `--salvage`, reads all that is whole"
+    )
     assert str(caught.value) == f"{path}: table messages, from row {first} on: {reason}"
 
 
@@ -349,7 +352,8 @@ def test_a_database_that_lost_its_end_is_salvaged(tmp_path: Path) -> None:
     with pytest.raises(BagError) as caught:
         SqliteReader(str(path))
     assert str(caught.value) == (
-        f"{path}: sqlite3 says: database disk image is malformed; `bag convert --on-error skip` reads what is whole"
+        f"{path}: sqlite3 says: database disk image is malformed; `bag convert --on-error skip`, "
+        "elsewhere `--salvage`, reads what is whole"
     )
     with SqliteReader(str(path), salvage=True) as reader:
         rows = rows_of(reader)

@@ -34,7 +34,7 @@ from benchmarks.bag_maker import (
     write_folder,
     write_mcap,
 )
-from rosidl_adapter_proto import BagError, SchemaError
+from rosidl_adapter_proto import BagError, SchemaError, open_bag
 from rosidl_adapter_proto.bags.convert import convert_bag
 from rosidl_adapter_proto.bags.table import record_batches, table_reader, write_table
 from rosidl_adapter_proto.cli import main
@@ -284,7 +284,7 @@ def error(kind: type[Exception], call: Callable[[], object]) -> str:
 
 def test_what_is_asked_for_is_not_there(path: Path, tmp_path: Path) -> None:
     assert (
-        error(BagError, lambda: table_reader(path, "/im"))
+        error(RequestError, lambda: table_reader(path, "/im"))
         == f"{path}: there is no topic /im; did you mean /imu?"
     )
     assert error(SchemaError, lambda: table_reader(path, "/imu", fields=["heade.stamp"])) == (
@@ -409,6 +409,26 @@ def test_command(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str])
         3,
         f"Error: {output} exists, and nothing is overwritten; choose another name, or remove it\n",
     )
+
+
+def test_a_bag_that_was_cut_off(path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = path.read_bytes()
+    cut, output = tmp_path / "cut.mcap", tmp_path / "t.parquet"
+    cut.write_bytes(whole[: len(whole) // 2])
+    arguments = ["bag", "table", str(cut), "/imu", "--output", str(output)]
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert (caught.value.code, output.exists()) == (3, False)
+    capsys.readouterr()
+
+    with pytest.raises(SystemExit) as caught:
+        main([*arguments, "--salvage"])
+
+    out, err = capsys.readouterr()
+    rows = len(pyarrow.parquet.read_table(output))
+    assert (caught.value.code, out) == (1, f"{output}: {rows} rows\n")
+    assert rows == len(list(open_bag(cut, salvage=True).messages("/imu"))) > 0
+    assert f"Warning: {cut} at byte " in err
 
 
 def test_no_table_to_the_standard_output(

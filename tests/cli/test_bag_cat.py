@@ -165,11 +165,8 @@ def test_times_without_a_time_zone(run: Run) -> None:
 
 def test_unknown_topics_and_fields(run: Run) -> None:
     ended = run("bag", "cat", "bag.mcap", "/imy")
-    assert (ended.code, ended.out, ended.err) == (
-        3,
-        "",
-        "Error: bag.mcap: there is no topic /imy; did you mean /imu?\n",
-    )
+    error = "Error: bag.mcap: there is no topic /imy; did you mean /imu?\n"
+    assert (ended.code, ended.out, ended.err) == (2, "", error)
     ended = run("bag", "cat", "bag.mcap", "/imu", "--fields", "header.time")
     error = "Error: sensor_msgs/msg/Imu.header has no field 'time'\n"
     assert (ended.code, ended.out, ended.err) == (3, "", error)
@@ -223,6 +220,31 @@ def test_topics_are_completed(before: list[str], typed: str, expected: list[str]
 
     assert [item.value for item in complete.get_completions(["bag", *before], typed)] == expected
     assert complete.get_completions(["bag", before[0], "none", *before[2:]], typed) == []
+
+
+def test_a_bag_that_was_cut_off(bag: Path, run: Run) -> None:
+    whole = bag.read_bytes()
+    bag.write_bytes(whole[: len(whole) // 2])
+    ended = run("bag", "cat", "bag.mcap", "/imu")
+    assert (ended.code, ended.out) == (3, "")
+    assert ended.err.endswith(
+        " whole, and `bag convert --on-error skip`, elsewhere `--salvage`, reads them\n"
+    )
+
+    ended = run("bag", "cat", "bag.mcap", "/imu", "--salvage")
+
+    assert ended.code == 1 and 100 < len(ended.out.splitlines()) < 400
+    searched, chunk, message = ended.err.splitlines()
+    assert searched.startswith(
+        "Warning: bag.mcap: the recording was not finished: it has no end; it was searched"
+    )
+    assert chunk.startswith("Warning: bag.mcap at byte 38: a Chunk record has ")
+    assert message.startswith("Warning: bag.mcap at byte ")
+    assert run("bag", "info", "bag.mcap").code == 3
+    information = run("bag", "info", "bag.mcap", "--salvage")
+    assert (information.code, information.err) == (1, ended.err)
+    bag.write_bytes(whole)
+    assert run("bag", "cat", "bag.mcap", "/imu", "--salvage") == run("bag", "cat", "bag.mcap", "/imu")
 
 
 def test_a_pipe_that_closes(bag: Path) -> None:

@@ -15,6 +15,8 @@ from rosidl_adapter_proto.cli.texts import size_text, time_text
         (1000, "1.0 kB"),
         (123_456, "123 kB"),
         (99_960, "100 kB"),
+        (999_499, "999 kB"),
+        (999_960, "1.0 MB"),
         (2.5e12, "2.5 TB"),
         (5e16, "50.0 PB"),
         (10**18, "1000 PB"),

@@ -155,7 +155,7 @@ def test_a_plugin_takes_the_topics_of_its_encoding(path: Path, plugin_files: dic
     found = read_series(open_bag(path), plugin=open_plugin(plugin_files["ros2msg"]))
     assert same(found, read_series(open_bag(path)))
     text = f"{path}: the plugin is for other topics than these, which are ros2msg"
-    with pytest.raises(BagError, match=f"^{re.escape(text)}$"):
+    with pytest.raises(RequestError, match=f"^{re.escape(text)}$"):
         read_series(open_bag(path), plugin=open_plugin(plugin_files["protobuf"]))
 
 
@@ -246,7 +246,7 @@ def test_topics_of_which_nothing_is_known(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [
-        ({"topics": ["/ima"]}, BagError, "there is no topic /ima; did you mean /imu?"),
+        ({"topics": ["/ima"]}, RequestError, "there is no topic /ima; did you mean /imu?"),
         (
             {"fields": ["/gps"]},
             BagError,

@@ -77,7 +77,7 @@ def test_what_is_missing_is_told_and_makes_exit_code_1(tmp_path: Path, run: Run)
         (("--clamp",), 2, "Error: --clamp needs --array-limit: how many elements to show.\n"),
         (("--output", "-"), 2, "Error: series cannot go to the standard output; name a file\n"),
         (("--output", "a.xml"), 2, "Error: a.xml: the suffix says no format of series; name the file "),
-        (("--topic", "/ima"), 3, "there is no topic /ima; did you mean /imu?\n"),
+        (("--topic", "/ima"), 2, "there is no topic /ima; did you mean /imu?\n"),
         (("--field", "/imu/header/stam"), 2, "there is no series /imu/header/stam; did you mean "),
     ],
 )

@@ -11,7 +11,7 @@
 namespace rosidl_proto {
 
 // The largest schema that is read, in bytes.
-constexpr size_t kMaximumSchemaSize = 4 * 1024 * 1024;
+constexpr size_t kMaximumSchemaSize = size_t{4} << 20;
 
 // Reads the text that MCAP calls `ros2msg` (https://mcap.dev/spec/registry#ros2msg): the definition of the
 // type, and those of the types in it, each behind a line of 80 `=` and one such as `MSG: std_msgs/Header`. A

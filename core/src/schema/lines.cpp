@@ -7,7 +7,7 @@
 namespace rosidl_proto {
 namespace {
 
-enum class Kind { Other, Space, Break };
+enum class Kind : uint8_t { Other, Space, Break };
 
 Kind kind_of(uint32_t character) {
   switch (character) {

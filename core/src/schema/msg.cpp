@@ -46,8 +46,8 @@ bool is_string(CdrForm cdr) { return cdr == CdrForm::String || cdr == CdrForm::W
 // Reads a length or a bound: a whole number above 0 that CDR has a count for.
 const char* read_count(std::string_view text, uint32_t* count) {
   constexpr size_t kMostDigits = 10;
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data(), end, *count);
+  const char *const begin = text.data(), *const end = begin + text.size();
+  const auto [rest, error] = std::from_chars(begin, end, *count);
   const bool is_count = error == std::errc() && rest == end && *count != 0 && text.size() <= kMostDigits;
   return is_count ? nullptr : "the length of an array or a bound is not a whole number from 1 to 4294967295";
 }

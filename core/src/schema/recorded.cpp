@@ -13,8 +13,6 @@ constexpr size_t kMaximumDefinitions = 10'000;
 bool is_letter(char each) { return (each >= 'A' && each <= 'Z') || (each >= 'a' && each <= 'z'); }
 bool is_digit(char each) { return each >= '0' && each <= '9'; }
 
-bool is_blank(std::string_view text) { return strip(text).empty(); }
-
 // Returns whether a line is one of the rules between definitions.
 bool is_rule(std::string_view line) {
   constexpr size_t kWidth = 80;
@@ -93,10 +91,11 @@ const char* Definitions::split(std::string_view text, const TypeName& top) {
     definitions_.push_back({type, behind});
     rest = behind;
   }
+  for (Definition& each : definitions_) each.text = strip(each.text);
   // A text that begins with a rule has its own type behind one; but a message without fields has no text.
   const bool is_behind = std::any_of(definitions_.begin() + 1, definitions_.end(),
                                      [&top](const Definition& each) { return each.type == top; });
-  if (is_blank(definitions_.front().text) && (is_behind || top.name_space != "msg"))
+  if (definitions_.front().text.empty() && (is_behind || top.name_space != "msg"))
     definitions_.erase(definitions_.begin());
   return nullptr;
 }
@@ -108,14 +107,18 @@ const char* Definitions::merge() {
   });
   if (definitions_.empty()) return nullptr;
   auto kept = definitions_.begin();
+  std::string_view latest = kept->text;  // compared instead of the kept one, so that no text is read often
   for (auto each = kept + 1; each != definitions_.end(); ++each) {
     if (!(each->type == kept->type)) {
       *++kept = *each;
-    } else if (is_blank(kept->text)) {
+    } else if (kept->text.empty()) {
       *kept = *each;
-    } else if (!is_blank(each->text) && !has_same_words(kept->text, each->text)) {
+    } else if (each->text.empty()) {
+      continue;
+    } else if (!has_same_words(latest, each->text)) {
       return "the text defines a type twice, not in the same way";
     }
+    latest = each->text;
   }
   definitions_.erase(kept + 1, definitions_.end());
   return definitions_.size() > kMaximumDefinitions ? "the text has more than 10000 definitions" : nullptr;

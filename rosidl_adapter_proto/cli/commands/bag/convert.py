@@ -12,13 +12,13 @@ import click
 
 from rosidl_adapter_proto.cli.conversion_report import ProgressLine, show_outcome, show_outcomes, show_result
 from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, plugin_option, time_options
+from rosidl_adapter_proto.cli.texts import EXIT_INCOMPLETE
 from rosidl_adapter_proto.errors import RequestError
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.bags.many import BagOutcome, BagTask
     from rosidl_adapter_proto.bags.workers import Workers
 
-EXIT_INCOMPLETE = 1
 EXIT_SOME_FAILED = 3
 
 

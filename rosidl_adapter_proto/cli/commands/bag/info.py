@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options
-from rosidl_adapter_proto.cli.texts import show_warnings, size_text
+from rosidl_adapter_proto.cli.options import bag_source_options, salvage_option
+from rosidl_adapter_proto.cli.texts import EXIT_INCOMPLETE, show_warnings, size_text
 from rosidl_adapter_proto.time import to_datetime
 
 if TYPE_CHECKING:
@@ -20,18 +20,20 @@ if TYPE_CHECKING:
 @click.command("info", short_help="Tell what is in a bag.")
 @click.argument("bag", type=click.Path())
 @click.option("--json", "as_json", is_flag=True, help="Print it as JSON, for other programs.")
+@salvage_option
 @bag_source_options
-def command(bag: str, as_json: bool, include: tuple[Path, ...], distro: str | None) -> None:
+def command(bag: str, as_json: bool, include: tuple[Path, ...], distro: str | None, salvage: bool) -> int:
     """Tell what is in BAG: files, times, topics with their types and counts, and what is odd about it."""
     from rosidl_adapter_proto.bags.bag import open_bag
     from rosidl_adapter_proto.bags.information import bag_information
 
-    with open_bag(bag, include=include, distro=distro) as opened:
+    with open_bag(bag, include=include, distro=distro, salvage=salvage) as opened:
         information = bag_information(opened)
     if as_json:
         click.echo(json.dumps(asdict(information), indent=2))
     else:
         _print(information)
+    return EXIT_INCOMPLETE if opened.is_damaged else 0
 
 
 def _print(information: BagInformation) -> None:

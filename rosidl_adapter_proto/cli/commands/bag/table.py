@@ -6,8 +6,14 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
-from rosidl_adapter_proto.cli.texts import progress_bar, show_warnings
+from rosidl_adapter_proto.cli.options import (
+    bag_source_options,
+    complete_topic,
+    fields_option,
+    salvage_option,
+    time_options,
+)
+from rosidl_adapter_proto.cli.texts import progress_bar, show_bag_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 
@@ -23,6 +29,7 @@ from rosidl_adapter_proto.errors import RequestError
 )
 @fields_option
 @time_options
+@salvage_option
 @bag_source_options
 def command(
     bag: str,
@@ -34,7 +41,8 @@ def command(
     end: int | None,
     include: tuple[Path, ...],
     distro: str | None,
-) -> None:
+    salvage: bool,
+) -> int:
     """Write the messages of a TOPIC in BAG as a table, with a row for each and its fields as columns.
 
     The suffix of FILE says what is written: .parquet, .arrow or .feather, or .csv. Nested messages and lists stay what
@@ -48,7 +56,7 @@ def command(
         raise RequestError(str(error)) from None
     if output == "-":
         raise RequestError("a table cannot go to the standard output; name a file")
-    with open_bag(bag, include=include, distro=distro) as opened:
+    with open_bag(bag, include=include, distro=distro, salvage=salvage) as opened:
         found = opened.topics.get(topic)
         with progress_bar(found.message_count if found else 0) as progress:
             rows = write_table(
@@ -61,5 +69,6 @@ def command(
                 end=end,
                 progress=progress,
             )
-        show_warnings(opened.warnings)
+        status = show_bag_warnings(opened)
     click.echo(f"{output}: {rows} rows")
+    return status
