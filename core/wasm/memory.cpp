@@ -1,11 +1,5 @@
-// What the C and C++ libraries need of a system, so that a plugin imports nothing.
-//
-// WebAssembly without its exceptions cannot unwind: what is thrown stops the plugin. So nothing is allocated
-// with `new` before `have_memory` has said that it can be.
 #include "memory.hpp"
 
-#include <__verbose_abort>
-#include <cerrno>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
@@ -13,16 +7,18 @@
 namespace rosidl_proto::plugin {
 namespace {
 
-constexpr uint64_t kPageSize = 65536;
-
-bool fixed = false;
-
 uint64_t memory_size() { return __builtin_wasm_memory_size(0) * kPageSize; }
+
+bool can_allocate(uint64_t size) {
+  void* memory = std::malloc(static_cast<size_t>(size));
+  asm volatile("" : "+r"(memory));  // else compilers do neither of both
+  std::free(memory);
+  return memory != nullptr;
+}
 
 }  // namespace
 
-FixedMemory::FixedMemory() noexcept { fixed = true; }
-FixedMemory::~FixedMemory() { fixed = false; }
+bool FixedMemory::now = false;
 
 bool is_memory(uint64_t address, uint64_t size) noexcept {
   return address != 0 && address <= memory_size() && size <= memory_size() - address;
@@ -36,25 +32,22 @@ std::string_view memory_from(uint64_t address) noexcept {
 
 bool have_memory(uint64_t size) noexcept {
   if (size > SIZE_MAX / 2) return false;
-  void* const memory = std::malloc(static_cast<size_t>(size));
-  std::free(memory);
-  return memory != nullptr;
+  uint64_t largest = 0;
+  {
+    const FixedMemory fixed;
+    for (uint64_t step = size; step > 0; step /= 2) {
+      if (largest + step <= size && can_allocate(largest + step)) largest += step;
+    }
+  }
+  if (largest == size) return true;
+  // `malloc` would get all of it anew. What is there lies at the end, where the rest comes after it.
+  void* const most = std::malloc(static_cast<size_t>(largest));
+  const bool rest = can_allocate(size - largest);
+  std::free(most);
+  return rest && can_allocate(size);
 }
 
 }  // namespace rosidl_proto::plugin
-
-// What `malloc` gets its memory from.
-extern "C" void* sbrk(intptr_t size) {
-  using namespace rosidl_proto::plugin;
-  constexpr auto kPage = static_cast<intptr_t>(kPageSize);
-  if (size == 0) return reinterpret_cast<void*>(static_cast<uintptr_t>(memory_size()));
-  const size_t before = fixed || size < 0 || size % kPage != 0
-                            ? SIZE_MAX
-                            : __builtin_wasm_memory_grow(0, static_cast<size_t>(size / kPage));
-  if (before != SIZE_MAX) return reinterpret_cast<void*>(before * static_cast<size_t>(kPageSize));
-  errno = ENOMEM;
-  return reinterpret_cast<void*>(-1);
-}
 
 void* operator new(std::size_t size) {
   void* const memory = std::malloc(size == 0 ? 1 : size);
@@ -66,13 +59,3 @@ void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
-
-extern "C" {
-[[noreturn]] void* __cxa_allocate_exception(std::size_t) noexcept { __builtin_trap(); }
-[[noreturn]] void __cxa_throw(void*, void*, void (*)(void*)) { __builtin_trap(); }
-}
-
-// The library's own one prints, and printing would be an import.
-_LIBCPP_BEGIN_NAMESPACE_STD
-[[noreturn]] void __libcpp_verbose_abort(const char*, ...) noexcept { __builtin_trap(); }
-_LIBCPP_END_NAMESPACE_STD

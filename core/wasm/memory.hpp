@@ -6,6 +6,8 @@
 
 namespace rosidl_proto::plugin {
 
+constexpr uint64_t kPageSize = 65536;
+
 // Whether so many bytes at an address are memory. No host knows address 0.
 bool is_memory(uint64_t address, uint64_t size) noexcept;
 
@@ -18,10 +20,12 @@ bool have_memory(uint64_t size) noexcept;
 // While there is one of these, the memory keeps its size and place: hosts have pointers into it.
 class FixedMemory {
  public:
-  FixedMemory() noexcept;
+  FixedMemory() noexcept { now = true; }
   FixedMemory(const FixedMemory&) = delete;
   FixedMemory& operator=(const FixedMemory&) = delete;
-  ~FixedMemory();
+  ~FixedMemory() { now = false; }
+
+  static bool now;
 };
 
 }  // namespace rosidl_proto::plugin

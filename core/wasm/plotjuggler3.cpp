@@ -37,6 +37,7 @@ ROSIDL_PROTO_EXPORT(free) void plugin_free(void* memory) { std::free(memory); }
 // Hosts of today leave the topic empty, and put it before the keys themselves.
 ROSIDL_PROTO_EXPORT(pj_parser_create)
 uint32_t pj_parser_create(uint32_t, uint32_t type_name, uint32_t schema) {
+  if (!is_memory(type_name, 1) || !is_memory(schema, 1)) return 0;
   const uint32_t self = add_parser();
   if (self == 0) return 0;
   if (find_parser(self)->load(text_at(type_name), schema_in(memory_from(schema))) == nullptr) return self;

@@ -25,6 +25,9 @@ enum class Answer : int32_t {
 
 constexpr uint64_t kMaximumErrorText = 512;
 
+// Stands for what the error of the message says.
+constexpr const char* kBadMessage = "the message is not valid";
+
 // What was wrong where there was no instance to tell.
 const char* wrong_without_instance = "";
 
@@ -103,7 +106,7 @@ int32_t parse(Parser* parser, uint64_t address, uint64_t size, uint64_t output_a
   if (message.size > size - kMessageHeader)
     return answer(parser, Answer::Malformed, "the message is longer than what it came in");
   const uint64_t written = parser->flatten(FlatFormat::Module, message, {parser->output.get(), kOutputSize});
-  if (written == 0) return answer(parser, Answer::Failed, nullptr);
+  if (written == 0) return answer(parser, Answer::Failed, kBadMessage);
   store_little(writable_at(output_address), uint64_t{reinterpret_cast<uintptr_t>(parser->output.get())});
   store_little(writable_at(output_size), written);
   return answer(parser, Answer::Good, "");
@@ -139,8 +142,10 @@ int32_t pj_module_parse(uint64_t instance, uint64_t address, uint64_t size, uint
 
 ROSIDL_PROTO_EXPORT(pj_module_last_error)
 uint64_t pj_module_last_error(uint64_t instance, uint64_t address, uint64_t capacity) {
-  Parser* const parser = find_parser(instance);
-  std::string_view text = parser == nullptr ? wrong_without_instance : parser->wrong;
+  if (!have_memory(kSomeMemory)) return 0;
+  const Parser* const parser = find_parser(instance);
+  std::string text = parser == nullptr ? wrong_without_instance : parser->wrong;
+  if (parser != nullptr && parser->wrong == kBadMessage) text = reason(parser->error);
   const uint64_t size = std::min({uint64_t{text.size()}, capacity, kMaximumErrorText});
   if (!is_memory(address, size)) return 0;
   std::memcpy(writable_at(address), text.data(), static_cast<size_t>(size));

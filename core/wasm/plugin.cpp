@@ -1,18 +1,17 @@
 #include "plugin.hpp"
 
-#include <vector>
-
 #include "encoding.hpp"
 #include "memory.hpp"
-#include "rosidl_adapter_proto/schema.hpp"
 
 namespace rosidl_proto::plugin {
 namespace {
 
-// What reading a schema allocates at most, if nothing of it is used twice. The names of types have their own
-// limit, since any number of messages can have one in common.
-constexpr uint64_t kMemoryOfAny = 256 << 10, kMemoryOfByte = 100;
-constexpr size_t kMaximumTypeName = 1024;
+// Schemas are read with these limits, one after the other, since the last ones need much memory.
+constexpr SchemaLimits kLimits[] = {{300, 1'500}, {2'400, 12'000}, {}};
+
+// What a loaded plan takes for each byte of a packed one: an operation of 40 bytes becomes one of 136, a
+// field of 24, and places for what is found in a message of 40 bytes or less.
+constexpr uint64_t kLoadedSize = 8;
 
 // A handle is the place of a parser, counted from 1, and above it a number that is another one for each
 // parser at that place.
@@ -34,12 +33,20 @@ Place* find_place(uint64_t handle) {
 
 const char* Parser::load(std::string_view type_name, std::string_view schema) noexcept {
   flattener.reset();
-  if (type_name.size() > kMaximumTypeName) return "the name of the type has more than 1024 bytes";
   if (schema.size() > kMaximumSchemaSize) return "the schema has more than 4194304 bytes";
-  if (!have_memory(kMemoryOfAny + kMemoryOfByte * schema.size())) return kNoMemory;
   std::vector<uint8_t> packed_plan;
   FlatNotes notes;
-  if (const char* problem = read_schema(schema, type_name, &packed_plan, &notes)) return problem;
+  const char* problem = nullptr;
+  for (const SchemaLimits& limits : kLimits) {
+    if (!have_memory(kSomeMemory + reading_memory(schema.size(), limits))) return kNoMemory;
+    problem = read_schema(schema, type_name, &packed_plan, &notes, limits);
+    if (problem != kTooManyFields && problem != kTooManyValues) break;
+  }
+  return problem != nullptr ? problem : load(packed_plan, std::move(notes));
+}
+
+const char* Parser::load(const std::vector<uint8_t>& packed_plan, FlatNotes notes) noexcept {
+  if (!have_memory(kSomeMemory + kLoadedSize * packed_plan.size())) return kNoMemory;
   Plan plan;
   if (const char* problem = plan.load(packed_plan.data(), packed_plan.size())) return problem;
   auto loaded = std::make_unique<Flattener>();

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "rosidl_adapter_proto/flat.hpp"
 
@@ -18,16 +19,21 @@ namespace rosidl_proto::plugin {
 // The most that a message is flattened to: hosts of PlotJuggler 3 have so much room, and do not say so.
 constexpr uint64_t kOutputSize = 1 << 20;
 
+// For anything small.
+constexpr uint64_t kSomeMemory = 256 << 10;
+
 constexpr const char* kNoMemory = "there is not enough memory";
 
 struct Parser {
   std::unique_ptr<Flattener> flattener;  // none before there is a schema
   std::unique_ptr<uint8_t[]> output;     // of PlotJuggler 4; others have their own
   Error error;                           // of the last message
-  const char* wrong = nullptr;           // of anything else
+  const char* wrong = "";                // of anything else
 
   // Reads a schema, in place of the one before. Returns nullptr, or what is wrong.
   const char* load(std::string_view type_name, std::string_view schema) noexcept;
+
+  const char* load(const std::vector<uint8_t>& packed_plan, FlatNotes notes) noexcept;
 
   // Returns how many bytes were written, or 0 and an error.
   uint64_t flatten(FlatFormat format, Input message, Output output) noexcept;

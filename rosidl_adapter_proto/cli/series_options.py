@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rosidl_adapter_proto.cli.options import complete_topic
-from rosidl_adapter_proto.cli.texts import progress_bar, show_warnings
+from rosidl_adapter_proto.cli.texts import EXIT_INCOMPLETE, progress_bar, show_bag_warnings, show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.plotjuggler.series import Series
 
-EXIT_INCOMPLETE = 1
 _LONGEST_TEXT = 24
 
 
@@ -67,6 +66,7 @@ def show_series(
     include: tuple[Path, ...],
     distro: str | None,
     *,
+    salvage: bool,
     topics: tuple[str, ...],
     fields: tuple[str, ...],
     array_limit: int | None,
@@ -91,7 +91,7 @@ def show_series(
         check_file(output)
     opened_plugin = None if plugin is None else open_plugin(plugin)
     policy = None if array_limit is None else ArrayPolicy(clamp, array_limit)
-    with open_bag(bag, include=include, distro=distro) as opened:
+    with open_bag(bag, include=include, distro=distro, salvage=salvage) as opened:
         chosen = chosen_topics(opened, topics, SeriesNames(fields), opened_plugin)
         with progress_bar(sum(opened.topics[name].message_count for name in chosen)) as progress:
             found = read_series(opened, chosen, fields, opened_plugin, start, end, policy, progress)
@@ -100,8 +100,9 @@ def show_series(
         else:
             write_series(found.series, output)
             click.echo(f"{output}: {len(found.series)} series")
-        show_warnings([*opened.warnings, *found.warnings])
-    return EXIT_INCOMPLETE if found.warnings else 0
+        show_warnings(found.warnings)
+        status = show_bag_warnings(opened)
+    return EXIT_INCOMPLETE if found.warnings else status
 
 
 def require_plotjuggler() -> None:

@@ -124,7 +124,9 @@ def chosen_topics(
     parsed = [name for name in chosen if plugin is None or is_for(plugin, bag.topics[name])]
     if chosen and not parsed:
         found = sorted({each for name in chosen for each in encodings(bag.topics[name]) if each})
-        raise RequestError(f"{bag.path}: the plugin is for other topics than these, which are {', '.join(found)}")
+        raise RequestError(
+            f"{bag.path}: the plugin is for other topics than these, which are {', '.join(found)}"
+        )
     return parsed
 
 

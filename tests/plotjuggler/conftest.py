@@ -1,4 +1,4 @@
-"""The plugins, built once for each version of their sources."""
+"""Our plugins, built once."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from rosidl_adapter_proto.plotjuggler.build import build_plugins, source_digest
+from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
 
-BUILT = Path(__file__).parent.parent.parent / "build" / "plugins"
+
+@pytest.fixture
+def plugin(encoding: str) -> Path:
+    """The plugin for the messages of an encoding, which the test has as a parameter."""
+    return plugin_path(encoding)
 
 
 @pytest.fixture(scope="session")
 def plugin_files() -> dict[str, Path]:
-    """Our plugins by their encodings."""
-    folder = BUILT / source_digest()
-    paths = sorted(folder.glob("*.wasm")) or build_plugins(folder)
-    return {path.stem: path for path in paths}
+    """All of them, by their encodings."""
+    return {encoding: plugin_path(encoding) for encoding in ("protobuf", "ros2msg")}

@@ -6,6 +6,7 @@ Facts from `wasm_runtime.cpp` and `wasm_parser.cpp` of that program. Whatever th
 from __future__ import annotations
 
 import struct
+from functools import cache
 from pathlib import Path
 
 import wasmtime
@@ -23,17 +24,23 @@ _NUMBERS = {
 _STRING, _BLOB = 18, 19
 
 
+@cache
+def _compiled(plugin: Path) -> tuple[wasmtime.Engine, wasmtime.Module]:
+    engine = wasmtime.Engine()
+    return engine, wasmtime.Module.from_file(engine, plugin)
+
+
 class ReleasedHost:
     """One plugin, with one instance for all topics."""
 
     def __init__(self, plugin: Path, memory_limit: int | None = None) -> None:
-        engine = wasmtime.Engine()
+        engine, module = _compiled(plugin)
         self.store = wasmtime.Store(engine)
         if memory_limit is not None:
             self.store.set_limits(memory_size=memory_limit)
         linker = wasmtime.Linker(engine)
         linker.define_wasi()
-        instance = linker.instantiate(self.store, wasmtime.Module.from_file(engine, plugin))
+        instance = linker.instantiate(self.store, module)
         self.exports = instance.exports(self.store)
         memory = self.exports["memory"]
         assert isinstance(memory, wasmtime.Memory)
@@ -82,8 +89,8 @@ class ReleasedParser:
     def set_array_policy(self, clamp: bool, maximum: int) -> None:
         self.host.call("pj_parser_set_array_policy", self.instance, clamp, maximum)
 
-    def decode(self, message: bytes) -> bytes | None:
-        """Return the output; None for a message that is dropped."""
+    def decode(self, message: bytes, function: str = "pj_parser_decode") -> bytes | None:
+        """Return the output; None for a message that is dropped. The document has another function for it."""
         host = self.host
         if self.input_size < len(message):
             host.call("free", self.input)
@@ -91,7 +98,7 @@ class ReleasedParser:
             self.input = host.allocate(self.input_size)
         pages = host.memory.size(host.store)
         host.memory.write(host.store, message, self.input)
-        size = host.call("pj_parser_decode", self.instance, self.input, len(message), self.output)
+        size = host.call(function, self.instance, self.input, len(message), self.output)
         # The pointer to the output was taken before the call.
         assert host.memory.size(host.store) == pages
         if size <= 0:

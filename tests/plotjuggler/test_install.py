@@ -9,13 +9,7 @@ import pytest
 
 from rosidl_adapter_proto.cli import main
 from rosidl_adapter_proto.errors import PluginError
-from rosidl_adapter_proto.plotjuggler import install
 from rosidl_adapter_proto.plotjuggler.install import NAMES, install_plugins, plugin_folder
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch, plugin_files: dict[str, Path]) -> None:
-    monkeypatch.setattr(install, "plugin_path", plugin_files.__getitem__)
 
 
 @pytest.mark.parametrize(

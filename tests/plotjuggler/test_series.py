@@ -16,7 +16,7 @@ from benchmarks.bag_maker import IMU, JOINT_STATES, SCAN, START, TF, record, wri
 from rosidl_adapter_proto import BagError, open_bag
 from rosidl_adapter_proto.bags.convert import convert_bag
 from rosidl_adapter_proto.errors import RequestError
-from rosidl_adapter_proto.plotjuggler import series_buffers, topic_parsers
+from rosidl_adapter_proto.plotjuggler import series_buffers
 from rosidl_adapter_proto.plotjuggler.columns import Column
 from rosidl_adapter_proto.plotjuggler.host import ArrayPolicy, open_plugin
 from rosidl_adapter_proto.plotjuggler.series import BagSeries, read_series
@@ -25,11 +25,6 @@ from tests.plotjuggler import outputs, wat
 
 FLOAT, TEXT = BuiltinType.FLOAT64, BuiltinType.STRING
 STREAMS = (IMU, JOINT_STATES, SCAN, TF)
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch, plugin_files: dict[str, Path]) -> None:
-    monkeypatch.setattr(topic_parsers, "plugin_path", plugin_files.__getitem__)
 
 
 @pytest.fixture(scope="module")

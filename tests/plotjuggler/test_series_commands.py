@@ -9,7 +9,6 @@ import pytest
 from mcap.writer import Writer
 
 from benchmarks.bag_maker import IMU, SCAN, record, write_mcap
-from rosidl_adapter_proto.plotjuggler import topic_parsers
 from tests.cli.conftest import Outcome, Run, run
 
 __all__ = ["run"]
@@ -19,11 +18,6 @@ topic  key                type    count  first       last
 /imu   /header/stamp/sec  int32      20  1700000000  1700000000
 /imu   /header/frame_id   string     20  "imu_link"  "imu_link"
 """
-
-
-@pytest.fixture(autouse=True)
-def built(monkeypatch: pytest.MonkeyPatch, plugin_files: dict[str, Path]) -> None:
-    monkeypatch.setattr(topic_parsers, "plugin_path", plugin_files.__getitem__)
 
 
 @pytest.fixture

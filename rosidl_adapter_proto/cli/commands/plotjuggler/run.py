@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, salvage_option, time_options
 from rosidl_adapter_proto.cli.series_options import series_options, show_series
 
 
@@ -15,6 +15,7 @@ from rosidl_adapter_proto.cli.series_options import series_options, show_series
 @click.argument("bag", type=click.Path())
 @series_options
 @time_options
+@salvage_option
 @bag_source_options
 def command(plugin: str, bag: str, include: tuple[Path, ...], distro: str | None, **options: object) -> int:
     """Run PLUGIN, a .wasm file, over the messages of BAG that have its encoding, and show the time series.
