@@ -12,13 +12,18 @@ import struct
 import sys
 from pathlib import Path
 
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "core" / "samples")]
 
+from protobuf_types import class_of, descriptor_of, fill, general_file  # noqa: E402
 from reference_cdr import write_cdr, write_ros1  # noqa: E402
 from ros_types import describe, nasty_types, protobuf_class, protobuf_message, random_value  # noqa: E402
 
+from rosidl_adapter_proto.transcode import _core  # noqa: E402
 from rosidl_adapter_proto.transcode.plan import build_plan  # noqa: E402
+from rosidl_adapter_proto.transcode.protobuf_plan import protobuf_plan  # noqa: E402
 
 VALUES = 3
 GROUP = b"\x0b\x10\x05\x13\x14\x1a\x02ab\x0c"
@@ -57,6 +62,20 @@ def chunk(number: int, *messages: bytes) -> bytes:
     return result
 
 
+def general_inputs(number: int) -> tuple[bytes, dict[str, bytes]]:
+    """Return the plan of a message that does not come from ROS, which gets this number, and inputs for it."""
+    file = general_file()
+    descriptor = descriptor_of([file], "test.General")
+    plan = protobuf_plan(descriptor)[0].pack()
+    inputs = {"descriptor_set": b"\7" + FileDescriptorSet(file=[file]).SerializeToString()}
+    both_ways = _core.Transcoder(plan, "test.General", 2**31 - 1)
+    for i in range(VALUES):
+        proto = fill(class_of(descriptor)(), random.Random(i)).SerializeToString()
+        inputs[f"general_proto_{i}"] = bytes((1, number)) + proto
+        inputs[f"general_cdr_{i}"] = bytes((0, number)) + both_ways.proto_to_cdr(proto)
+    return plan, inputs
+
+
 def main(directory: Path) -> None:
     types = nasty_types()
     inputs = directory / "inputs"
@@ -88,6 +107,10 @@ def main(directory: Path) -> None:
                     (inputs / f"{number}_{kind}_{i}").write_bytes(content)
     for number, text in enumerate(TEXTS):
         (inputs / f"text_{number}").write_bytes(b"\6" + text.encode())
+    plan, others = general_inputs(len(plans))
+    plans.append(plan)
+    for name, content in others.items():
+        (inputs / name).write_bytes(content)
     (directory / "plans.bin").write_bytes(b"".join(map(sized, plans)))
 
 

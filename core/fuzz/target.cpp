@@ -1,4 +1,4 @@
-// The fuzz target: all directions, plans themselves, chunks of messages, and schemas.
+// The fuzz target: all directions, columns and pairs, plans themselves, chunks of messages, and schemas.
 //
 // The first byte of an input says what to do with the rest:
 //   0  the number of a plan, and then a CDR message; 1  the same with a protobuf message
@@ -7,6 +7,7 @@
 //   4  the number of a plan, and then a message of ROS 1
 //   5  a chunk, in which each topic id is the number of a plan and a way to treat its messages
 //   6  the text of the type test/msg/Root
+//   7  a FileDescriptorSet of `test.General`
 // The plans with numbers are in the file that the environment variable ROSIDL_PROTO_FUZZ_PLANS names, each
 // with its size before it. make_corpus.py writes that file and inputs to begin with.
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "columns.hpp"
+#include "flat.hpp"
 #include "rosidl_adapter_proto/convert.hpp"
 #include "rosidl_adapter_proto/packed_fields.hpp"
 #include "rosidl_adapter_proto/schema.hpp"
@@ -199,6 +201,7 @@ void run(const Plan& plan, bool is_cdr, Input message) {
   round_trip(plan, is_cdr, message);
   is_cdr ? change(plan, message) : change_proto(plan, message);
   fuzz_columns(plan, message, check);
+  fuzz_flat(plan, message, check);
   const uint64_t number = 1;
   Slice slice;
   const uint8_t* const end = message.data + message.size;
@@ -332,6 +335,9 @@ void run_chunk(const std::vector<Plan>& plans, Input chunk) {
   check(failed == 0, "failures are not counted");
 }
 
+// Schemas
+// ----------------------------------------------------------------------------------------------------------
+
 // What is read of a schema is a plan, though its messages may be too large for one.
 void run_text(Input text) {
   std::vector<uint8_t> packed;
@@ -341,6 +347,20 @@ void run_text(Input text) {
   Plan plan;
   if (wrong != nullptr || (wrong = plan.load(packed.data(), packed.size())) == nullptr) return;
   check(std::string_view(wrong) == "a message of this type is larger than 2 GiB", wrong);
+}
+
+void run_descriptor_set(const uint8_t* data, size_t size) {
+  check(file_descriptor_set_size(data, size) <= size, "a descriptor set is larger than its memory");
+  std::vector<uint8_t> packed;
+  FlatNotes notes;
+  if (read_file_descriptor_set(data, size, "test.General", &packed, &notes) != nullptr) return;
+  Plan plan;
+  // What the reader leaves to this: names that are no UTF-8, field numbers that are there twice.
+  if (plan.load(packed.data(), packed.size()) != nullptr) return;
+  size_t operations = 0;
+  for (uint32_t i = 0; i < plan.message_count(); ++i) operations += plan.message(i).count;
+  check(notes.empty() || notes.size() == operations, "a field has no note");
+  run(plan, false, {data, size});
 }
 
 }  // namespace
@@ -362,6 +382,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     run_chunk(plans, {data + 1, size - 1});
   } else if (mode == 6) {
     run_text({data + 1, size - 1});
+  } else if (mode == 7) {
+    run_descriptor_set(data + 1, size - 1);
   }
   return 0;
 }

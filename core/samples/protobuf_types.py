@@ -106,7 +106,9 @@ def descriptor_of(files: list[descriptor_pb2.FileDescriptorProto], name: str) ->
 def class_of(descriptor: Descriptor) -> type[Any]:
     if hasattr(message_factory, "GetMessageClass"):
         return message_factory.GetMessageClass(descriptor)
-    return message_factory.MessageFactory().GetPrototype(descriptor)  # before protobuf 4.22
+    return message_factory.MessageFactory(descriptor.file.pool).GetPrototype(
+        descriptor
+    )  # before protobuf 4.22
 
 
 def fill(message: Message, rng: random.Random, depth: int = 0) -> Message:

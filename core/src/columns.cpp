@@ -181,7 +181,16 @@ bool Columns::append(Serialization serialization, Input message, Error& error) n
 
 bool Columns::run(Serialization serialization, Input message, Error& error) {
   Column* at = columns_.data();
-  return read_message(*plan_, serialization, message, ColumnSink(room_), *fields_, &at, error);
+  const ColumnSink sink(room_);
+  switch (serialization) {
+    case Serialization::Cdr:
+      return read_message<Serialization::Cdr>(*plan_, message, sink, *fields_, &at, error);
+    case Serialization::Protobuf:
+      return read_message<Serialization::Protobuf>(*plan_, message, sink, *fields_, &at, error);
+    case Serialization::Ros1:
+      return read_message<Serialization::Ros1>(*plan_, message, sink, *fields_, &at, error);
+  }
+  return false;
 }
 
 // Leaves the first `count` rows of a column and of those inside of it; returns the next one.

@@ -93,8 +93,8 @@ const char* Flattener::measure_paths() {
   return nullptr;
 }
 
-uint64_t Flattener::flatten(Serialization serialization, Input message, Output output,
-                            Error& error) noexcept {
+template <Serialization serialization>
+uint64_t Flattener::flatten_as(Input message, Output output, Error& error) noexcept {
   FlatPairs pairs(format_, output);
   uint8_t* at = pairs.begin();
   if (at == nullptr) {
@@ -109,8 +109,12 @@ uint64_t Flattener::flatten(Serialization serialization, Input message, Output o
                                   format_ == FlatFormat::Module ? 0u : 1u,
                                   policy_,
                                   message};
-  if (!read_message(plan_, serialization, message, FlatSink(setting, pairs), *fields_, &at, error)) return 0;
-  return pairs.finish(at);
+  const FlatSink sink(setting, pairs);
+  return read_message<serialization>(plan_, message, sink, *fields_, &at, error) ? pairs.finish(at) : 0;
 }
+
+template uint64_t Flattener::flatten_as<Serialization::Cdr>(Input, Output, Error&) noexcept;
+template uint64_t Flattener::flatten_as<Serialization::Protobuf>(Input, Output, Error&) noexcept;
+template uint64_t Flattener::flatten_as<Serialization::Ros1>(Input, Output, Error&) noexcept;
 
 }  // namespace rosidl_proto

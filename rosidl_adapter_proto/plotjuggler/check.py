@@ -27,13 +27,10 @@ from rosidl_adapter_proto.plotjuggler.manifest import (
     read_released_manifest,
     unseen_by_released,
 )
-from rosidl_adapter_proto.plotjuggler.module_manifest import (
-    ModuleManifest,
-    has_start_section,
-    read_module_manifest,
-)
+from rosidl_adapter_proto.plotjuggler.module_manifest import ModuleManifest, read_module_manifest
 from rosidl_adapter_proto.plotjuggler.modules import INPUT_HEADER, ModuleSession
 from rosidl_adapter_proto.plotjuggler.session import BrokenContract, Messages, ParserRequest, Session
+from rosidl_adapter_proto.plotjuggler.values import shown
 
 MODULE_MEMORY = 256 << 20
 MODULE_INSTRUCTIONS = 10_000_000
@@ -99,9 +96,11 @@ def check_plugin(plugin: str | Path | bytes) -> tuple[Report, ...]:
 def _export_points(program: Program, dialect: Dialect) -> Iterator[Point]:
     for function in dialect.functions:
         found = program.functions.get(function.name)
+        if found is None and not function.asked:
+            continue
         remark = "" if found == function.signature else "it does not" if found is None else f"it is {found}"
         yield Point(f"exports {function.name} {function.signature}", not remark, remark)
-    yield Point("exports its memory", "memory" in program.other_exports)
+    yield Point("exports its memory", program.file.has_memory)
 
 
 def _probe(name: str, probe: Callable[[], str]) -> Point:
@@ -118,8 +117,8 @@ def _probe(name: str, probe: Callable[[], str]) -> Point:
 
 def _function_points(program: Program, dialect: Dialect) -> Iterator[Point]:
     """Return the points of a dialect of PlotJuggler 3."""
-    unknown = [each for each in program.imports if not is_wasi(each)]
-    known = f"{', '.join(program.imports)}: they do nothing" if program.imports else ""
+    unknown = [each.name for each in program.file.imports if not is_wasi(each)]
+    known = f"{_import_names(program)}: they do nothing" if program.file.imports else ""
     yield Point("imports nothing but WASI", not unknown, ", ".join(unknown) or known)
     exports = list(_export_points(program, dialect))
     yield from exports
@@ -140,6 +139,10 @@ def _function_points(program: Program, dialect: Dialect) -> Iterator[Point]:
     yield _probe("refuses messages for no parser (self 0)", lambda: _parse_without_parser(start()))
     yield _probe("takes a policy for arrays for no parser", lambda: _policy(start()))
     yield _probe("takes or refuses messages of no sense", lambda: _parse_garbage(start()))
+
+
+def _import_names(program: Program) -> str:
+    return ", ".join(each.name for each in program.file.imports)
 
 
 def _nothing(_: object) -> str:
@@ -206,18 +209,18 @@ def _parse_garbage(session: Session) -> str:
 
 def _module_points(program: Program, dialect: Dialect) -> Iterator[Point]:
     """Return the points of modules of PlotJuggler 4."""
-    yield Point("imports nothing", not program.imports, ", ".join(program.imports))
+    yield Point("imports nothing", not program.file.imports, _import_names(program))
     exports = list(_export_points(program, dialect))
     yield from exports
     names = {function.name for function in dialect.functions}
     others = [
-        name
-        for name in (*program.functions, *program.other_exports)
+        shown(name)
+        for name in (*program.functions, *program.file.other_exports)
         if name == "_start" or (name.startswith("pj_module_") and name not in names)
     ]
     yield Point("exports neither _start nor other names with pj_module_", not others, ", ".join(others))
-    yield Point("has no start section", not has_start_section(program.data))
-    maximum = program.memory_maximum
+    yield Point("has no start section", not program.file.has_start)
+    maximum = program.file.memory_maximum
     remark = "it has none" if maximum is None else f"{maximum >> 20} MiB"
     yield Point(
         f"declares a maximum of its memory, of at most {MODULE_MEMORY >> 20} MiB",
@@ -230,7 +233,7 @@ def _module_points(program: Program, dialect: Dialect) -> Iterator[Point]:
         yield Point("has a manifest", False, str(error))
         return
     yield Point("has a manifest", True, f"encodings {', '.join(manifest.encodings)}")
-    if program.imports or not all(point.met for point in exports):
+    if program.file.imports or not all(point.met for point in exports):
         return
     yield from _module_probes(program, dialect, manifest)
 

@@ -18,7 +18,7 @@ from rosidl_adapter_proto.plotjuggler.output import (
     no_time,
 )
 from rosidl_adapter_proto.plotjuggler.session import BrokenContract, Messages, Outputs
-from rosidl_adapter_proto.plotjuggler.values import NUMBER_FORMATS, Blob, BuiltinType
+from rosidl_adapter_proto.plotjuggler.values import NUMBER_FORMATS, Blob, BuiltinType, shown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -255,7 +255,7 @@ def _text(data: bytes, place: Field, row: int) -> str:
         return data.decode()
     except UnicodeDecodeError as error:
         where = place.offset + error.start
-        raise BrokenContract(int(row), f"byte {where}: the text of {place.key} is not UTF-8") from None
+        raise BrokenContract(int(row), f"byte {where}: the text of {shown(place.key)} is not UTF-8") from None
 
 
 def _blobs(

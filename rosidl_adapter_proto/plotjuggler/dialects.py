@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rosidl_adapter_proto.errors import PluginError
-from rosidl_adapter_proto.plotjuggler.engine import Program, Signature
+from rosidl_adapter_proto.plotjuggler.engine import Program
 from rosidl_adapter_proto.plotjuggler.output import ReadLayout, read_module, read_page, read_released
+from rosidl_adapter_proto.plotjuggler.wasm_file import Signature
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,12 +22,14 @@ class Function:
     Attributes:
         name: Its name.
         signature: Its types.
-        needed: Whether a plugin without it cannot be run here; others are asked for by the contract alone.
+        needed: Whether a plugin without it cannot be run here.
+        asked: Whether the contract asks for it; others are used if they are there.
     """
 
     name: str
     signature: Signature
-    needed: bool = True
+    needed: bool
+    asked: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +53,10 @@ class Dialect:
     read_layout: ReadLayout
 
 
-def _function(name: str, parameters: str = "", results: str = "", needed: bool = True) -> Function:
-    return Function(name, Signature(tuple(parameters.split()), tuple(results.split())), needed)
+def _function(
+    name: str, parameters: str = "", results: str = "", *, needed: bool = True, asked: bool = True
+) -> Function:
+    return Function(name, Signature(tuple(parameters.split()), tuple(results.split())), needed, asked)
 
 
 _COMMON = (
@@ -71,6 +76,7 @@ DIALECTS = {
                 _function("pj_parser_decode", "i32 i32 i32 i32", "i32"),
                 _function("pj_parser_destroy", "i32", "", needed=False),
                 _function("malloc", "i32", "i32", needed=False),
+                _function("free", "i32", needed=False, asked=False),
             ),
             "pj_parser_decode",
             "malloc",
@@ -79,7 +85,13 @@ DIALECTS = {
         Dialect(
             "page",
             "PlotJuggler's page on WASM plugins",
-            (*_COMMON, _function("pj_parser_parse", "i32 i32 i32 i32", "i32")),
+            (
+                *_COMMON,
+                _function("pj_parser_parse", "i32 i32 i32 i32", "i32"),
+                _function("pj_parser_destroy", "i32", needed=False, asked=False),
+                _function("malloc", "i32", "i32", needed=False, asked=False),
+                _function("free", "i32", needed=False, asked=False),
+            ),
             "pj_parser_parse",
             "malloc",
             read_page,
@@ -106,16 +118,16 @@ DIALECTS = {
 }
 
 
-def unmet(dialect: Dialect, program: Program, all_functions: bool = False) -> list[str]:
-    """Return what a plugin has not, or has with other types, of the functions of a dialect and its memory."""
+def unmet(dialect: Dialect, program: Program) -> list[str]:
+    """Return what a plugin has not, or has with other types, of what it needs to be run in a dialect."""
     found = []
     for function in dialect.functions:
         signature = program.functions.get(function.name)
-        if signature is None and (function.needed or all_functions):
+        if signature is None and function.needed:
             found.append(f"it does not export {function.name}")
         elif signature is not None and signature != function.signature:
             found.append(f"{function.name} is {signature} instead of {function.signature}")
-    if "memory" not in program.other_exports:
+    if not program.file.has_memory:
         found.append("it does not export its memory")
     return found
 

@@ -10,14 +10,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rosidl_adapter_proto.errors import PluginError
+from rosidl_adapter_proto.plotjuggler.wasm_file import (
+    MAGIC,
+    PAGE,
+    Import,
+    Signature,
+    WasmFile,
+    read_wasm_file,
+)
 
 if TYPE_CHECKING:
     import wasmtime
     from typing_extensions import Buffer
 
 MAXIMUM_FILE_SIZE = 64 << 20
-PAGE = 1 << 16
-_MAGIC = b"\0asm"
+_NUMBERS = {"i32", "i64", "f32", "f64"}
 _WASI = ("wasi_snapshot_preview1.", "wasi_unstable.")
 _INITIALIZERS = ("_initialize", "__wasm_call_ctors")  # the first that there is is called, as PlotJuggler does
 
@@ -28,22 +35,11 @@ class Limits:
 
     Attributes:
         memory: How many bytes of memory it may have.
-        instructions: How many instructions a call may take; about as many as a second has nanoseconds.
+        instructions: How many instructions a call may take; with these, an endless loop is stopped in about a second.
     """
 
     memory: int = 256 << 20
     instructions: int = 2_000_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """The types of a function, such as `i32`."""
-
-    parameters: tuple[str, ...]
-    results: tuple[str, ...]
-
-    def __str__(self) -> str:
-        return f"({', '.join(self.parameters)}) -> {', '.join(self.results) or 'nothing'}"
 
 
 @dataclass(frozen=True)
@@ -54,19 +50,18 @@ class Program:
         name: What it is called, for people.
         data: Its bytes.
         module: What the engine made of it.
-        functions: The functions that it exports.
-        other_exports: The names of its other exports; `memory` among them if it is one.
-        imports: What it imports, as `module.name`.
-        memory_maximum: How many bytes its memory may have, by what it says itself; None for no maximum.
+        file: What the file has.
     """
 
     name: str
     data: bytes
     module: wasmtime.Module
-    functions: dict[str, Signature]
-    other_exports: tuple[str, ...]
-    imports: tuple[str, ...]
-    memory_maximum: int | None
+    file: WasmFile
+
+    @property
+    def functions(self) -> dict[str, Signature]:
+        """The functions that it exports."""
+        return self.file.functions
 
 
 def read_program(plugin: str | Path | bytes) -> Program:
@@ -76,38 +71,32 @@ def read_program(plugin: str | Path | bytes) -> Program:
         plugin: Its file, or its bytes.
 
     Raises:
-        PluginError: It cannot be read, is too large, or is no WebAssembly.
+        PluginError: It cannot be read, is too large, or is no WebAssembly, or there is no engine to run it.
     """
-    import wasmtime
-
+    try:
+        import wasmtime
+    except ImportError as error:
+        raise PluginError(
+            f"{error}; pip install 'rosidl-adapter-proto[plotjuggler]' brings what runs plugins"
+        ) from None
     name = "plugin" if isinstance(plugin, bytes) else Path(plugin).name
     data = plugin if isinstance(plugin, bytes) else _file_bytes(Path(plugin))
     if len(data) > MAXIMUM_FILE_SIZE:
         raise PluginError(f"{name}: more than {MAXIMUM_FILE_SIZE} bytes, which no plugin has")
-    if not data.startswith(_MAGIC):  # wasmtime would take a text for one
+    if not data.startswith(MAGIC):  # wasmtime would take a text for one
         raise PluginError(f"{name}: not a WebAssembly file")
     try:
         module = wasmtime.Module(engine(), data)
     except wasmtime.WasmtimeError as error:
         raise PluginError(f"{name}: not valid WebAssembly: {_one_line(str(error))}") from None
-    functions = {}
-    others = []
-    maximum = None
-    for each in module.exports:
-        kind = each.type
-        if isinstance(kind, wasmtime.FuncType):
-            functions[each.name] = _signature(kind)
-        elif isinstance(kind, wasmtime.MemoryType) or each.name != "memory":
-            others.append(each.name)
-        if isinstance(kind, wasmtime.MemoryType) and each.name == "memory" and kind.limits.max is not None:
-            maximum = kind.limits.max * PAGE
-    imports = tuple(f"{each.module}.{each.name}" for each in module.imports)
-    return Program(name, data, module, functions, tuple(others), imports, maximum)
+    return Program(name, data, module, read_wasm_file(data))
 
 
-def is_wasi(name: str) -> bool:
-    """Tell whether an import, as `module.name`, is of WASI: such functions are there, and do nothing."""
-    return name.startswith(_WASI)
+def is_wasi(needed: Import) -> bool:
+    """Tell whether an import is a function of WASI: those are there, and do nothing."""
+    if needed.signature is None or not needed.name.startswith(_WASI):
+        return False
+    return {*needed.signature.parameters, *needed.signature.results} <= _NUMBERS
 
 
 def _file_bytes(path: Path) -> bytes:
@@ -116,10 +105,6 @@ def _file_bytes(path: Path) -> bytes:
             return file.read(MAXIMUM_FILE_SIZE + 1)
     except OSError as error:
         raise PluginError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _signature(kind: wasmtime.FuncType) -> Signature:
-    return Signature(tuple(map(str, kind.params)), tuple(map(str, kind.results)))
 
 
 @functools.lru_cache(maxsize=1)
@@ -132,6 +117,8 @@ def engine() -> wasmtime.Engine:
     configuration.wasm_multi_memory = True  # the loops have a memory besides that of the plugin
     configuration.wasm_memory64 = False
     configuration.wasm_threads = False
+    configuration.wasm_function_references = False
+    configuration.wasm_gc = False
     atexit.register(engine.cache_clear)  # wasmtime frees what it has while its functions are still there
     return wasmtime.Engine(configuration)
 
@@ -177,7 +164,7 @@ class Instance:
         """
         import wasmtime
 
-        unknown = [name for name in program.imports if not is_wasi(name)]
+        unknown = [each.name for each in program.file.imports if not is_wasi(each)]
         if unknown:
             raise PluginError(
                 f"{program.name}: imports {', '.join(unknown)}, which a plugin does not get; build it without imports"
@@ -187,9 +174,7 @@ class Instance:
         self._limits = limits
         self._allocator = allocator
         self._arena = (0, 0)
-        self.store.set_limits(
-            memory_size=limits.memory, table_elements=100_000, instances=4, tables=10, memories=10
-        )
+        self._limit_memory(limits.memory)
         self.store.set_fuel(limits.instructions)
         linker = wasmtime.Linker(engine())
         try:
@@ -205,6 +190,15 @@ class Instance:
             if program.functions.get(name) == Signature((), ()):
                 self.call(name)
                 break
+
+    def _limit_memory(self, size: int) -> None:
+        self.store.set_limits(memory_size=size, table_elements=100_000, instances=4, tables=10, memories=10)
+
+    def grow(self, memory: wasmtime.Memory, size: int) -> None:
+        """Make a memory of ours larger, for which the plugin's limit does not hold."""
+        self._limit_memory(max(self._limits.memory, memory.data_len(self.store) + size))
+        memory.grow(self.store, size // PAGE)
+        self._limit_memory(self._limits.memory)
 
     def call(self, name: str, *arguments: int) -> Any:
         """Call a function that is exported, and return what it does.
@@ -245,6 +239,8 @@ class Instance:
         Raises:
             Trap: The plugin was stopped.
         """
+        if size > self._limits.memory:
+            return 0
         if self._allocator is not None:
             address: int = self.call(self._allocator, size) & 0xFFFF_FFFF
             return address if address + size <= self.memory.data_len(self.store) else 0

@@ -183,6 +183,10 @@ class Plugin:
         if self._dialect.name == "module":
             self._strikes += 1
 
+    def runs(self, session: Session) -> bool:
+        """Tell whether a session is the one that runs, and was not thrown away."""
+        return session is self._session
+
     def discard(self) -> None:
         """Throw away what runs, after a trap: the next session is a fresh one."""
         self._session = None
@@ -240,7 +244,7 @@ class Parser:
     def close(self) -> None:
         """Give back what it has in the plugin."""
         session, self._session = self._session, None
-        if session is not None and session is self._plugin.session():
+        if session is not None and self._plugin.runs(session):
             try:
                 session.destroy(self._handle)
             except Trap as trap:

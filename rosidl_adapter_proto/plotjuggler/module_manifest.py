@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from rosidl_adapter_proto.errors import PluginError
+from rosidl_adapter_proto.plotjuggler.wasm_file import custom_sections
 
 SECTION = "pj_parser_module_manifest"
 MAXIMUM_SIZE = 1 << 20
@@ -30,7 +30,6 @@ ENCODINGS = (
 )
 ROUTES = ("scalar", "object")
 ANY_TYPE = "*"
-_CUSTOM, _START = 0, 8  # numbers of sections
 _PRIORITIES = range(-1000, 1001)
 _NUMBER = r"(?:0|[1-9]\d*)"
 _IDENTIFIER = rf"(?:{_NUMBER}|\d*[A-Za-z-][0-9A-Za-z-]*)"
@@ -104,51 +103,10 @@ def read_module_manifest(data: bytes) -> ModuleManifest:
     Raises:
         PluginError: There is not exactly one, or it breaks a rule; the text says which member.
     """
-    found = _custom_sections(data, SECTION)
+    found = custom_sections(data, SECTION)
     if len(found) != 1:
         raise PluginError(f"{SECTION}: there are {len(found)} such custom sections instead of one")
     return parse_module_manifest(found[0])
-
-
-def has_start_section(data: bytes) -> bool:
-    """Tell whether a WebAssembly file runs something by itself once it is loaded.
-
-    Raises:
-        PluginError: A section ends behind the file.
-    """
-    return any(number == _START for number, _, _ in _sections(data))
-
-
-def _custom_sections(data: bytes, name: str) -> list[bytes]:
-    """Return the content of the custom sections that have a name."""
-    found = []
-    for number, begin, end in _sections(data):
-        if number == _CUSTOM:
-            length, text = _varuint32(data, begin)
-            if text + length <= end and data[text : text + length] == name.encode():
-                found.append(data[text + length : end])
-    return found
-
-
-def _sections(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Return the number of each section of a WebAssembly file, and where its content begins and ends."""
-    at = 8
-    while at < len(data):
-        size, begin = _varuint32(data, at + 1)
-        if size > len(data) - begin:
-            raise PluginError(f"byte {begin}: a section has {size} bytes, but {len(data) - begin} are left")
-        yield data[at], begin, begin + size
-        at = begin + size
-
-
-def _varuint32(data: bytes, at: int) -> tuple[int, int]:
-    """Return a number and where what follows it begins."""
-    value = 0
-    for index, byte in enumerate(data[at : at + 5]):
-        value |= (byte & 0x7F) << 7 * index
-        if byte < 0x80:
-            return value, at + index + 1
-    raise PluginError(f"byte {at}: a number does not end")
 
 
 def parse_module_manifest(text: bytes) -> ModuleManifest:

@@ -9,7 +9,7 @@ import numpy
 
 from rosidl_adapter_proto.errors import PluginError
 from rosidl_adapter_proto.plotjuggler.dialects import Dialect
-from rosidl_adapter_proto.plotjuggler.engine import PAGE, Limits, Program, write
+from rosidl_adapter_proto.plotjuggler.engine import Limits, Program, write
 from rosidl_adapter_proto.plotjuggler.loops import ERROR_SIZE, OUTPUTS, Stop
 from rosidl_adapter_proto.plotjuggler.module_manifest import Claim, ModuleManifest
 from rosidl_adapter_proto.plotjuggler.session import (
@@ -20,6 +20,7 @@ from rosidl_adapter_proto.plotjuggler.session import (
     ParserRequest,
     Session,
 )
+from rosidl_adapter_proto.plotjuggler.values import shown
 
 OUTPUT_CAPACITY = 16 << 20
 """How many bytes an output may have here; the contract has no limit but memory."""
@@ -40,7 +41,7 @@ class ModuleSession(Session):
         self._manifest = manifest
         # Where the module says where its output is, two numbers of 64 bits, and room for the text of an error.
         self._slots = self.allocate(16 + ERROR_SIZE, "results")
-        self._loop["memory"].grow(self.instance.store, OUTPUT_CAPACITY // PAGE)
+        self.instance.grow(self._loop["memory"], OUTPUT_CAPACITY)
 
     def create(self, request: ParserRequest) -> int:
         if request.array_policy is not None:
@@ -151,4 +152,4 @@ def binding(claim_index: int, claim: Claim, request: ParserRequest) -> bytes:
 
 def _error_text(data: bytes) -> str:
     """Return the text of an error that a module has written."""
-    return data.partition(b"\0")[0].decode(errors="replace") or "it says no reason"
+    return shown(data.partition(b"\0")[0].decode(errors="replace")) or "it says no reason"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from rosidl_adapter_proto.errors import PluginError
-from rosidl_adapter_proto.plotjuggler.values import NUMBER_FORMATS, Blob, BuiltinType, Value
+from rosidl_adapter_proto.plotjuggler.values import NUMBER_FORMATS, Blob, BuiltinType, Value, shown
 
 TIME_KEY = "__timestamp"
 
@@ -104,17 +104,18 @@ def _read_pairs(
     time = None
     for index in range(count):
         key = reader.text(length_format, f"the key of pair {index}")
+        name = shown(key)
         kind_offset = reader.offset
-        kind = _builtin_type(reader.number("<B", f"the type of {key}"), kind_offset, key)
+        kind = _builtin_type(reader.number("<B", f"the type of {name}"), kind_offset, name)
         if kind in numbers:
-            field = Field(key, kind, *reader.skip(numbers[kind], f"the value of {key}"))
+            field = Field(key, kind, *reader.skip(numbers[kind], f"the value of {name}"))
         elif kind == BuiltinType.STRING:
-            size: int = reader.number(length_format, f"the length of {key}")
-            field = Field(key, kind, *reader.skip(size, f"the text of {key}"))
+            size: int = reader.number(length_format, f"the length of {name}")
+            field = Field(key, kind, *reader.skip(size, f"the text of {name}"))
         elif kind == BuiltinType.BLOB:
-            field = Field(key, kind, *reader.skip(BLOB_SIZE, f"the blob of {key}"))
+            field = Field(key, kind, *reader.skip(BLOB_SIZE, f"the blob of {name}"))
         else:
-            raise PluginError(f"byte {kind_offset}: {key} has the type {kind.name}, which has no value here")
+            raise PluginError(f"byte {kind_offset}: {name} has the type {kind.name}, which has no value here")
         if embedded_time and key == TIME_KEY:
             if index or kind not in numbers:
                 raise PluginError(f"byte {kind_offset}: {TIME_KEY} is not a number in the first pair")
@@ -153,15 +154,16 @@ def read_module(data: bytes, embedded_time: bool) -> Layout:
                 f" but there are {len(data)}"
             )
         key = "/" + _utf8(data[name_offset : name_offset + name_size], name_offset, f"name {index}")
-        number: int = reader.number("<B", f"the type of {key}")
+        name = shown(key)
+        number: int = reader.number("<B", f"the type of {name}")
         if number not in MODULE_KINDS:
-            raise PluginError(f"byte {reader.offset - 1}: {key} has the type {number}, which there is not")
+            raise PluginError(f"byte {reader.offset - 1}: {name} has the type {number}, which there is not")
         kind = MODULE_KINDS[number]
         if kind == BuiltinType.STRING:
-            size: int = reader.number("<I", f"the length of {key}")
+            size: int = reader.number("<I", f"the length of {name}")
         else:
             size = NUMBER_SIZES[kind]
-        fields.append(Field(key, kind, *reader.skip(size, f"the value of {key}")))
+        fields.append(Field(key, kind, *reader.skip(size, f"the value of {name}")))
     time = Field(TIME_KEY, BuiltinType.INT64, 12, 8) if embedded_time and has_time else None
     return Layout(tuple(fields), time, time_in_nanoseconds=True, ignored=((3, 4), (5, 20)))
 
@@ -178,7 +180,9 @@ def field_value(data: bytes, field: Field, message_size: int) -> Value:
         PluginError: A text that is not UTF-8, or a blob that is not in the message.
     """
     if field.kind == BuiltinType.STRING:
-        return _utf8(data[field.offset : field.offset + field.size], field.offset, f"the text of {field.key}")
+        return _utf8(
+            data[field.offset : field.offset + field.size], field.offset, f"the text of {shown(field.key)}"
+        )
     if field.kind == BuiltinType.BLOB:
         offset, size = struct.unpack_from("<II", data, field.offset)
         if offset + size > message_size:
@@ -222,16 +226,16 @@ def no_time(field: Field, seconds: float) -> PluginError:
 def blob_outside(field: Field, offset: int, size: int, message_size: int) -> PluginError:
     """Return the error for a blob that the message has not."""
     return PluginError(
-        f"byte {field.offset}: {field.key} is a blob of {size} bytes at {offset},"
+        f"byte {field.offset}: {shown(field.key)} is a blob of {size} bytes at {offset},"
         f" but the message has {message_size} bytes"
     )
 
 
-def _builtin_type(number: int, offset: int, key: str) -> BuiltinType:
+def _builtin_type(number: int, offset: int, name: str) -> BuiltinType:
     try:
         return BuiltinType(number)
     except ValueError:
-        raise PluginError(f"byte {offset}: {key} has the type {number}, which there is not") from None
+        raise PluginError(f"byte {offset}: {name} has the type {number}, which there is not") from None
 
 
 def _utf8(data: bytes, offset: int, what: str) -> str:

@@ -12,8 +12,9 @@ import numpy
 
 from rosidl_adapter_proto.errors import PluginError
 from rosidl_adapter_proto.plotjuggler.dialects import Dialect
-from rosidl_adapter_proto.plotjuggler.engine import PAGE, Instance, Limits, Program, memory_view, write
+from rosidl_adapter_proto.plotjuggler.engine import Instance, Limits, Program, memory_view, write
 from rosidl_adapter_proto.plotjuggler.loops import NEXT, TABLE_ROWS, Stop, loop
+from rosidl_adapter_proto.plotjuggler.wasm_file import PAGE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -89,3 +89,12 @@ class ArrayPolicy:
 
     clamp: bool
     maximum: int
+
+
+def shown(text: str) -> str:
+    """Return a text of a plugin such that it can stand in an error: short, and without what controls a terminal."""
+    cut = text if len(text) <= _MAXIMUM_SHOWN else text[:_MAXIMUM_SHOWN] + "..."
+    return cut if cut.isprintable() else ascii(cut)
+
+
+_MAXIMUM_SHOWN = 200

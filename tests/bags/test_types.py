@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rosidl_adapter_proto import TypeRegistry
+from rosidl_adapter_proto.bags.descriptors import descriptor_set
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, RecordedDefinition, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition, ros_definition
 from rosidl_adapter_proto.errors import BagError, RequestError, SchemaError
@@ -273,6 +274,32 @@ def test_there_and_back() -> None:
         "std_msgs/msg/Header.proto",
         "my_msgs/msg/Track.proto",
     ]
+
+
+SMALL = "int8 level\nint8[] levels\nwstring name\nfloat64 value\n"
+
+
+def told(data: bytes) -> dict[str, int]:
+    """Return the fields whose options tell the ROS type, which `descriptor.proto` does not know."""
+    (file,) = FileDescriptorSet.FromString(data).file
+    options = {each.name: each.options.SerializeToString() for each in file.message_type[0].field}
+    assert all(each[:-1] in (b"", b"\xaa\xc7\x21\x01") for each in options.values())
+    return {name: each[-1] for name, each in options.items() if each}
+
+
+def test_a_recording_tells_what_protobuf_does_not() -> None:
+    recorded = topic(SMALL)
+    schema = types(recorded).schema(recorded)
+    assert told(protobuf_definition(schema).data) == {"level": 2, "levels": 2, "name": 18}
+    assert told(descriptor_set(schema.descriptor)) == {}
+
+
+def test_a_recording_need_not_tell_what_protobuf_does_not() -> None:
+    recorded = topic(SMALL)
+    bag = types(recorded)
+    plain = RecordedDefinition(PROTOBUF, descriptor_set(bag.schema(recorded).descriptor))
+    converted = Topic(**{**vars(in_protobuf(recorded, bag)), "definition": plain})
+    assert types(converted).schema(converted).message_class is bag.schema(recorded).message_class
 
 
 def test_definitions_that_were_not_recorded(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from array import array
 from pathlib import Path
@@ -275,3 +276,11 @@ def test_ranges_and_texts_that_are_wrong() -> None:
         parser.parse_batch(b"abc", array("Q", [0, 3]), array("q", [1, 2]))
     with pytest.raises(RequestError, match="a topic and a type have no NUL byte"):
         open_plugin(wat.plugin()).parser("/a\0b", "a/Type", b"")
+
+
+def test_without_an_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "wasmtime", None)
+    with pytest.raises(
+        PluginError, match=r"pip install 'rosidl-adapter-proto\[plotjuggler\]' brings what runs plugins"
+    ):
+        open_plugin(b"")

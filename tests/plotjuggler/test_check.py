@@ -121,6 +121,8 @@ def test_the_command(tmp_path: Path) -> None:
         "  yes  exports pj_parser_create (i32, i32, i32) -> i32\n"
         "  yes  exports pj_parser_set_array_policy (i32, i32, i32) -> nothing\n"
         "  yes  exports pj_parser_parse (i32, i32, i32, i32) -> i32\n"
+        "  yes  exports pj_parser_destroy (i32) -> nothing\n"
+        "  yes  exports malloc (i32) -> i32\n"
         "  yes  exports its memory\n"
         "  yes  starts, and has memory for outputs\n"
         "  yes  has a manifest: encoding echo\n"

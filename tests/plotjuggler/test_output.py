@@ -61,6 +61,13 @@ RELEASED = {
     ): "byte 34: the length of the key of pair 2 has 4 bytes,"
     " but 0 are left",
 }
+RELEASED |= {
+    outputs.released(
+        ("\x1b[2J", B.OTHER, b"")
+    ): "byte 12: '\\x1b[2J' has the type OTHER, which has no value here",
+    outputs.released(("k" * 300, B.OTHER, b"")): f"byte 308: {'k' * 200}... has the type OTHER,"
+    " which has no value here",
+}
 PAGE = {
     outputs.page(("/b", B.BOOL, b"\1")): "byte 8: /b has the type BOOL, which has no value here",
     replaced(outputs.page(TEXT), 12, b"\6"): "byte 14: the text of /text has 6 bytes, but 5 are left",

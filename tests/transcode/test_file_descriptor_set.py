@@ -144,9 +144,9 @@ def test_types_are_looked_for_from_the_inside_to_the_outside(name: str, has_type
     add_field(message.nested_type.add(name="Near"), "inside", 1, ["int32"])
     add_field(add_message(file, "Near"), "outside", 1, ["int32"])
     field = message.field.add(name="near", number=1, label=1, type_name=name)
-    if has_type:
-        field.type = field.TYPE_MESSAGE
-    check(descriptor_of([file], "test.Type"), set_of(file))
+    data = set_of(file)
+    field.type = field.TYPE_MESSAGE  # which not every version of protobuf finds out by itself
+    check(descriptor_of([file], "test.Type"), set_of(file) if has_type else data)
 
 
 def test_messages_of_editions_may_be_groups() -> None:

@@ -73,9 +73,21 @@ class Flattener {
   // Writes the pairs of a message and returns how many bytes these are; 0 and an error if the message is not
   // valid, or if there is no room for the count. Pairs that do not fit are left out, and so are all that
   // follow.
-  uint64_t flatten(Serialization serialization, Input message, Output output, Error& error) noexcept;
+  uint64_t flatten(Serialization serialization, Input message, Output output, Error& error) noexcept {
+    switch (serialization) {  // here, so that a plugin that only wants one does not have the others
+      case Serialization::Cdr:
+        return flatten_as<Serialization::Cdr>(message, output, error);
+      case Serialization::Protobuf:
+        return flatten_as<Serialization::Protobuf>(message, output, error);
+      case Serialization::Ros1:
+        return flatten_as<Serialization::Ros1>(message, output, error);
+    }
+    return 0;
+  }
 
  private:
+  template <Serialization serialization>
+  uint64_t flatten_as(Input message, Output output, Error& error) noexcept;
   const char* read();
   const char* add(const Operation& op, FlatField& field);
   const char* add_map(const Operation& op);

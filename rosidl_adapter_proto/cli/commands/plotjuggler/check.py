@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rosidl_adapter_proto.errors import RequestError
-
 if TYPE_CHECKING:
     from rosidl_adapter_proto.plotjuggler.check import Report
 
@@ -24,10 +22,8 @@ def command(context: click.Context, plugin: Path) -> None:
 
     No messages are needed. The exit code is 0 if it meets at least one of them whole, else 1.
     """
-    try:
-        from rosidl_adapter_proto.plotjuggler.check import check_plugin
-    except ImportError as error:
-        raise RequestError(f"{error}; pip install rosidl-adapter-proto[plotjuggler] brings it") from None
+    from rosidl_adapter_proto.plotjuggler.check import check_plugin
+
     reports = check_plugin(plugin)
     for report in reports:
         _print(report)
