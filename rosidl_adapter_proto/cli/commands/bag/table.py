@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
 from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
+from rosidl_adapter_proto.cli.progress import progress_bar
 from rosidl_adapter_proto.cli.texts import show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
@@ -53,7 +51,7 @@ def command(
         raise RequestError("a table cannot go to the standard output; name a file")
     with open_bag(bag, include=include, distro=distro) as opened:
         found = opened.topics.get(topic)
-        with _progress_bar(found.message_count if found else 0) as progress:
+        with progress_bar(found.message_count if found else 0) as progress:
             rows = write_table(
                 opened,
                 topic,
@@ -66,13 +64,3 @@ def command(
             )
         show_warnings(opened.warnings)
     click.echo(f"{output}: {rows} rows")
-
-
-@contextmanager
-def _progress_bar(length: int) -> Iterator[Callable[[int], None] | None]:
-    """Show how far the work is, on a terminal; yield what to tell it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    with click.progressbar(length=length, file=sys.stderr) as bar:
-        yield bar.update
