@@ -52,7 +52,7 @@ test:
 	$(MAKE) --jobs=1 check docs test-core test-kilted test-jazzy test-colcon test-fuzz
 
 PYTHON_FOLDERS := rosidl_adapter_proto tests examples benchmarks core docs
-CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.?pp)
+CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/src/*/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.?pp)
 
 # The hooks of .pre-commit-config.yaml are these.
 check: check-black check-clang-format check-ruff check-mypy
@@ -77,7 +77,7 @@ docs: $(VENV)/ready
 tidy: $(VENV)/ready
 	$(BIN)/cmake -S . -B build/core -DROSIDL_PROTO_TEST=ON -DROSIDL_PROTO_PYTHON=OFF \
 	  -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
-	$(BIN)/clang-tidy -p build/core --quiet core/src/*.cpp core/test/*.cpp
+	$(BIN)/clang-tidy -p build/core --quiet core/src/*.cpp core/src/*/*.cpp core/test/*.cpp
 
 # Prints at the end how much of the program the tests run, also in processes that they start.
 test-kilted: $(VENV)/ready

@@ -46,17 +46,40 @@ void check_error(const Plan& plan, const Error& error, uint64_t size) {
   field_path(error, plan);
 }
 
+using Append = bool(const Plan&, Input, Output, uint64_t*, Error&) noexcept;
+
+// One step makes what two steps make, in memory of exactly that size or with a byte more, and fails where
+// they fail.
+void check_one_step(const Plan& plan, Input message, Append* append, const Heap* proto) {
+  for (const uint64_t more : {0, 1}) {
+    Heap room((proto == nullptr ? message.size : proto->size) + more);
+    Error error;
+    uint64_t size = 0;
+    if (!append(plan, message, {room.data.get(), room.size}, &size, error)) {
+      check_error(plan, error, message.size);
+      check(proto == nullptr, "one step fails where two do not");
+    } else {
+      check(proto != nullptr && size == proto->size &&
+                std::memcmp(room.data.get(), proto->data.get(), size) == 0,
+            "one step and two make different messages");
+    }
+  }
+}
+
 std::unique_ptr<Heap> to_proto(const Plan& plan, Input cdr) {
   Error error;
   Lengths lengths;
   uint64_t size = 0;
-  if (!measure_cdr_to_proto(plan, cdr, kLimit, lengths, &size, error))
-    return check_error(plan, error, cdr.size), nullptr;
+  if (!measure_cdr_to_proto(plan, cdr, kLimit, lengths, &size, error)) {
+    check_error(plan, error, cdr.size);
+    return check_one_step(plan, cdr, append_cdr_to_proto, nullptr), nullptr;
+  }
   check(size <= kLimit, "a result passes the limit");
   check(lengths.size() <= cdr.size, "there are more lengths than bytes");
   auto proto = std::make_unique<Heap>(size);
   check(write_cdr_to_proto(plan, cdr, lengths, 0, {proto->data.get(), size}, error),
         "measured CDR cannot be written");
+  check_one_step(plan, cdr, append_cdr_to_proto, proto.get());
   return proto;
 }
 
@@ -77,12 +100,15 @@ std::unique_ptr<Heap> ros1_to_proto(const Plan& plan, Input ros1) {
   Error error;
   Lengths lengths;
   uint64_t size = 0;
-  if (!measure_ros1_to_proto(plan, ros1, kLimit, lengths, &size, error))
-    return check_error(plan, error, ros1.size), nullptr;
+  if (!measure_ros1_to_proto(plan, ros1, kLimit, lengths, &size, error)) {
+    check_error(plan, error, ros1.size);
+    return check_one_step(plan, ros1, append_ros1_to_proto, nullptr), nullptr;
+  }
   check(size <= kLimit, "a result passes the limit");
   auto proto = std::make_unique<Heap>(size);
   check(write_ros1_to_proto(plan, ros1, lengths, 0, {proto->data.get(), size}, error),
         "measured ROS 1 cannot be written");
+  check_one_step(plan, ros1, append_ros1_to_proto, proto.get());
   return proto;
 }
 
@@ -270,6 +296,7 @@ void run_chunk(const std::vector<Plan>& plans, Input chunk) {
   const std::vector<MessageRecord> found = messages_of({result.data.data(), result.data.size()});
   check(found.size() == result.message_count, "a result cannot be read again");
   size_t place = 0, failed = 0;
+  ByTopic<uint64_t> failure_counts;
   for (size_t i = 0; i < messages.size(); ++i) {
     const MessageRecord& message = messages[i];
     if (message.topic_id >= 0x8000) continue;
@@ -278,8 +305,11 @@ void run_chunk(const std::vector<Plan>& plans, Input chunk) {
     if (expected) {
       content = input_of(expected);
     } else {
-      check(failed < result.failures.size() && result.failures[failed].index == i, "a failure is not told");
+      check(
+          failed >= kKeptFailures || (failed < result.failures.size() && result.failures[failed].index == i),
+          "a failure is not told");
       ++failed;
+      ++failure_counts[message.topic_id];
       check_error(plans[message.topic_id / kWays], converter->error(message), message.data.size);
       if (!converter->route(message.topic_id).copy_failed) continue;
     }
@@ -291,7 +321,13 @@ void run_chunk(const std::vector<Plan>& plans, Input chunk) {
               (content.size == 0 || std::memcmp(converted.data.data, content.data, content.size) == 0),
           "a message is not what it becomes alone");
   }
-  check(place == found.size() && failed == result.failures.size(), "there are too many messages");
+  check(place == found.size(), "there are too many messages");
+  check(result.failures.size() == std::min(failed, kKeptFailures), "there are too many failures");
+  result.failure_counts.each([&](uint16_t topic_id, uint64_t count) {
+    check(count == failure_counts[topic_id], "failures are not counted");
+    failed -= count;
+  });
+  check(failed == 0, "failures are not counted");
 }
 
 }  // namespace

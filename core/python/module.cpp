@@ -9,6 +9,7 @@
 
 #include "columns.hpp"
 #include "records.hpp"
+#include "schema.hpp"
 #include "transcoder.hpp"
 
 namespace rosidl_proto {
@@ -210,4 +211,5 @@ NB_MODULE(_core, module) {
       .def(nb::init<nb::handle_t<Transcoder>, nb::object>(), nb::arg("transcoder"), nb::arg("message_class"));
   define_columns(module);
   define_records(module);
+  define_schema(module);
 }

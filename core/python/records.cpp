@@ -227,8 +227,8 @@ class Converter {
     }
   }
 
-  // Returns the result, the number of its messages, and for each message that failed its topic id, log time,
-  // sequence, index and error.
+  // Returns the result, the number of its messages, how many messages of each topic failed, and of the first
+  // of those topic id, log time, sequence, index and error.
   nb::tuple convert(nb::handle data, uint64_t start_time, nb::handle end_time) const {
     const Buffer buffer(data);
     const TimeRange times = times_of(start_time, end_time);
@@ -242,6 +242,10 @@ class Converter {
     }
     nb::object memory = nb::cast(PooledMemory(std::move(result.data), pool_));
     if (!good) fail(error);
+    nb::dict failure_counts;
+    result.failure_counts.each([&](uint16_t topic_id, uint64_t count) {
+      if (count != 0) failure_counts[nb::int_(topic_id)] = count;
+    });
     nb::list failures;
     for (const FailedMessage& failed : result.failures) {
       const MessageRecord& message = failed.message;
@@ -249,7 +253,7 @@ class Converter {
       failures.append(nb::make_tuple(message.topic_id, message.log_time, message.sequence, failed.index,
                                      transcoder.exception(converter_.error(message), nb::none())));
     }
-    return nb::make_tuple(memory, result.message_count, failures);
+    return nb::make_tuple(memory, result.message_count, failure_counts, failures);
   }
 
  private:
@@ -267,6 +271,7 @@ void define_records(nb::module_& module) {
              nb::arg("publish_times"), nb::arg("messages"),
              "Return message records, one after the other, as they stand in a chunk.");
   module.def("index_records", &index, nb::arg());
+  module.attr("KEPT_FAILURES") = kKeptFailures;
   nb::class_<Memory>(module, "Memory", nb::type_slots(memory_slots));
   nb::class_<PooledMemory, Memory>(module, "PooledMemory");
   nb::class_<Converter>(module, "RecordConverter")

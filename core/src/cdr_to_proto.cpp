@@ -1,7 +1,6 @@
 #include <limits>
 
-#include "cdr_reader.hpp"
-#include "protobuf_sinks.hpp"
+#include "protobuf_append.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
 
 namespace rosidl_proto {
@@ -38,6 +37,13 @@ bool write_cdr_to_proto(const Plan& plan, Input cdr, const Lengths& lengths, uin
   uint8_t* out = proto.data;
   return swapped ? CdrReader<true, false, ProtobufWriter>(plan, cdr, sink, error).run(&out)
                  : CdrReader<false, false, ProtobufWriter>(plan, cdr, sink, error).run(&out);
+}
+
+bool append_cdr_to_proto(const Plan& plan, Input cdr, Output room, uint64_t* size, Error& error) noexcept {
+  bool swapped;
+  if (!byte_order(cdr, &swapped, error)) return false;
+  return swapped ? append_protobuf<true, PlainCdr>(plan, cdr, room, size, error)
+                 : append_protobuf<false, PlainCdr>(plan, cdr, room, size, error);
 }
 
 }  // namespace rosidl_proto

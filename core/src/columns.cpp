@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <exception>
 
-#include "cdr_reader.hpp"
 #include "column_sink.hpp"
-#include "protobuf_reader.hpp"
+#include "read_message.hpp"
 
 namespace rosidl_proto {
 namespace {
@@ -181,29 +180,8 @@ bool Columns::append(Serialization serialization, Input message, Error& error) n
 }
 
 bool Columns::run(Serialization serialization, Input message, Error& error) {
-  uint8_t nothing;
-  if (message.size == 0) message.data = &nothing;  // a place that is nowhere is an error
-  const ColumnSink sink(room_);
   Column* at = columns_.data();
-  switch (serialization) {
-    case Serialization::Cdr: {
-      bool swapped;
-      if (!byte_order(message, &swapped, error)) return false;
-      return swapped ? CdrReader<true, true, ColumnSink>(*plan_, message, sink, error).run(&at)
-                     : CdrReader<false, true, ColumnSink>(*plan_, message, sink, error).run(&at);
-    }
-    case Serialization::Ros1:
-      return CdrReader<false, true, ColumnSink, Ros1>(*plan_, message, sink, error).run(&at);
-    case Serialization::Protobuf:
-      if (message.size > kMaximumSize) {
-        error.reason = Reason::WireSize;
-        error.a = message.size;
-        return false;
-      }
-      return ProtobufReader<true, true, ColumnSink>(*plan_, message, sink, error)
-          .run(fields_->slots(), false, &at);
-  }
-  return false;
+  return read_message(*plan_, serialization, message, ColumnSink(room_), *fields_, &at, error);
 }
 
 // Leaves the first `count` rows of a column and of those inside of it; returns the next one.

@@ -7,7 +7,8 @@
 namespace rosidl_proto {
 namespace {
 
-// Measures messages and writes them, one after the other. What is kept between the two steps is used again.
+// Measures messages and writes them, one after the other, or both in one step. What is kept between the two
+// steps is used again.
 class Steps {
  public:
   explicit Steps(const Plan* widest) {
@@ -21,6 +22,15 @@ class Steps {
     if (route.treatment == Treatment::Ros1ToProto)
       return measure_ros1_to_proto(*route.plan, message, route.size_limit, lengths_, size, error);
     return measure_cdr_to_proto(*route.plan, message, route.size_limit, lengths_, size, error);
+  }
+
+  // Whether messages can be written that were not measured.
+  static bool has_one(const Route& route) { return route.treatment != Treatment::ProtoToCdr; }
+
+  static bool append(const Route& route, Input message, Output room, uint64_t* size, Error& error) {
+    return route.treatment == Treatment::Ros1ToProto
+               ? append_ros1_to_proto(*route.plan, message, room, size, error)
+               : append_cdr_to_proto(*route.plan, message, room, size, error);
   }
 
   bool write(const Route& route, Input message, Output output, Error& error) {
@@ -53,16 +63,33 @@ class Conversion {
   bool transcode(const MessageRecord& message, const Route& route, uint64_t index) {
     uint64_t size = 0;
     Error error;
+    if (Steps::has_one(route) && append(message, route, &size)) return true;
     if (steps_.measure(route, message.data, &size, error)) {
       uint8_t* const out = begin(message, route.topic_id, size);
       if (out == nullptr) return false;
       if (steps_.write(route, message.data, {out, size}, error)) return end(size), true;
     }
-    result_.failures.push_back({index, message});
+    ++result_.failure_counts[message.topic_id];
+    if (result_.failures.size() < kKeptFailures) result_.failures.push_back({index, message});
     return !route.copy_failed || copy_message(message, route.failed_topic_id);
   }
 
  private:
+  // Writes a message to what room there is; false if that is not enough, or if something is wrong with the
+  // message.
+  bool append(const MessageRecord& message, const Route& route, uint64_t* size) {
+    constexpr uint64_t kHeader = kRecordHeader + kMessageFields;
+    Memory& data = result_.data;
+    const uint64_t room = std::min(data.capacity(), kMaximumChunk) - data.size();
+    if (room < kHeader) return false;
+    uint8_t* const out = data.data() + data.size();
+    const Output content = {out + kHeader, std::min(room - kHeader, route.size_limit)};
+    Error error;
+    if (!Steps::append(route, message.data, content, size, error)) return false;
+    put_message_header(out, message, route.topic_id, *size);
+    return end(*size), true;
+  }
+
   // Makes room for a message and writes its header; it counts from `end` on.
   uint8_t* begin(const MessageRecord& message, uint16_t topic_id, uint64_t size) {
     const uint64_t whole = kRecordHeader + kMessageFields + size;

@@ -87,6 +87,8 @@ const char* text_of(Reason reason) {
     case Reason::ColumnsFull:
       return "a column would have more than {a} bytes, or all of them more than twice that; choose fewer "
              "fields";
+    case Reason::NoRoom:
+      return "there is no room for the result";
     case Reason::Changed:
       return "the data changed while it was read; give a copy that nobody writes to";
   }

@@ -11,8 +11,6 @@
 namespace rosidl_proto {
 namespace {
 
-constexpr char kMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
-constexpr size_t kHeaderBytes = 20, kMessageBytes = 24, kOperationBytes = 40;
 constexpr const char* kLargeMessage = "a message of this type is larger than 2 GiB";
 constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 
@@ -203,21 +201,21 @@ const char* Plan::load(const uint8_t* data, size_t size) noexcept {
 }
 
 const char* Plan::read(const uint8_t* data, size_t size) {
-  if (size < kHeaderBytes || std::memcmp(data, kMark, sizeof kMark - 1) != 0)
+  if (size < kPlanHeaderBytes || std::memcmp(data, kPlanMark, sizeof kPlanMark - 1) != 0)
     return "the plan does not begin as a plan does";
-  if (data[3] != static_cast<uint8_t>(kMark[3])) {
+  if (data[3] != static_cast<uint8_t>(kPlanMark[3])) {
     return "the plan has another version than this core, which reads version 2; build it again";
   }
-  Words header(data + sizeof kMark);
+  Words header(data + sizeof kPlanMark);
   const uint64_t messages = header.word(), operations = header.word(), names = header.word();
   const uint32_t partial = header.word();
-  if (size != kHeaderBytes + messages * kMessageBytes + operations * kOperationBytes + names ||
+  if (size != kPlanHeaderBytes + messages * kPlanMessageBytes + operations * kPlanOperationBytes + names ||
       messages == 0) {
     return "the plan does not have the size that it names";
   }
   if (partial > 1) return "the plan has an unknown property";
   partial_ = partial != 0;
-  const uint8_t* p = data + kHeaderBytes;
+  const uint8_t* p = data + kPlanHeaderBytes;
   names_.assign(reinterpret_cast<const char*>(data + size - names), names);
   const auto is_name = [this](Name name) {
     return uint64_t{name.place} + name.size <= names_.size() &&
@@ -236,7 +234,7 @@ const char* Plan::read(const uint8_t* data, size_t size) {
     if (!is_name(message.name) || !is_name(message.protobuf_name))
       return "the plan has a name that is not among its names";
     first += message.count;
-    p += kMessageBytes;
+    p += kPlanMessageBytes;
   }
   if (first != operations) return "the messages of the plan do not cover its operations";
   operations_.resize(operations);
@@ -244,7 +242,7 @@ const char* Plan::read(const uint8_t* data, size_t size) {
     if (const char* wrong = read_operation(p, op)) return wrong;
     if (!is_name(op.name) || !is_name(op.protobuf_name))
       return "the plan has a name that is not among its names";
-    p += kOperationBytes;
+    p += kPlanOperationBytes;
   }
   return nullptr;
 }

@@ -1,5 +1,5 @@
 // Sinks that make protobuf (https://protobuf.dev/programming-guides/encoding/): one finds its size, one
-// writes it.
+// writes what was measured, and one writes what was not.
 //
 // Fields are written in the order in which they come, which protobuf allows (any order is valid). Defaults
 // are left out, as every proto3 serializer does.
@@ -123,8 +123,10 @@ class ProtobufSize : public Stop {
   const uint64_t limit_;
 };
 
-// Writes what `ProtobufSize` measured.
-class ProtobufWriter : public Stop {
+// Writes what `ProtobufSize` measured, or what was not measured: then the length of a submessage is known
+// when it ends, and what is behind a length that takes more than one byte moves.
+template <bool kMeasured>
+class ProtobufOutput : public Stop {
  public:
   using At = uint8_t*;
   static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
@@ -134,8 +136,8 @@ class ProtobufWriter : public Stop {
     At end;
   };
 
-  // `first` is the place of the first length.
-  ProtobufWriter(Output proto, const Lengths& lengths, uint64_t first)
+  // `first` is the place of the first length; there are none of what was not measured.
+  ProtobufOutput(Output proto, const Lengths& lengths, uint64_t first)
       : lengths_(lengths), place_(first), end_(proto.data + proto.size) {}
 
   static bool failed(At at) { return at == nullptr; }
@@ -146,10 +148,10 @@ class ProtobufWriter : public Stop {
     if (raw == 0) return out;
     const uint64_t value = F::to_wire(raw);
     if constexpr (F::kWireType == WireType::Varint) {
-      if (!room(out, op.tag_size + varint_size(value))) return changed();
+      if (!room(out, op.tag_size + varint_size(value))) return full();
       return put_varint(put_tag(out, op), value);
     } else {
-      if (!room(out, op.tag_size + wire_size<F>(raw))) return changed();
+      if (!room(out, op.tag_size + wire_size<F>(raw))) return full();
       return put_fixed<F>(put_tag(out, op), value);
     }
   }
@@ -161,15 +163,18 @@ class ProtobufWriter : public Stop {
     if constexpr (F::kCopiesToProtobuf) {
       if (const uint8_t* const bytes = numbers.bytes()) return delimited(op, out, Text{bytes, size});
     }
-    if (!kCountTellsSize<F> && !next_length(&size)) return changed();
-    if ((out = begin_delimited(op, out, size)) == nullptr) return changed();
+    constexpr bool kOpen = !kMeasured && !kCountTellsSize<F>;
+    if (kMeasured && !kCountTellsSize<F> && !next_length(&size)) return full();
+    out = kOpen ? open(op, out) : begin_delimited(op, out, size);
+    if (out == nullptr) return full();
+    uint8_t* const content = out;
     bool good;
     if constexpr (F::kIsText) {
       good = put_text<F>(numbers, &out);
     } else if constexpr (F::kWireType == WireType::Varint) {
       good = numbers.each([&](typename F::Raw raw) {
         const uint64_t value = F::to_wire(raw);
-        if (!room(out, varint_size(value))) return changed() != nullptr;
+        if (!room(out, varint_size(value))) return full() != nullptr;
         out = put_varint(out, value);
         return true;
       });
@@ -179,7 +184,8 @@ class ProtobufWriter : public Stop {
         return true;
       });
     }
-    return good ? out : nullptr;
+    if (!good) return nullptr;
+    return kOpen ? close(content, out) : out;
   }
 
   At elements(const Operation&, At out, uint64_t) { return out; }
@@ -191,28 +197,36 @@ class ProtobufWriter : public Stop {
   template <class Units>
   At wstring(const Operation& op, At out, int64_t element, const Units& units) {
     if (units.count() == 0 && element == kNoElement) return out;
-    if ((out = begin_delimited(op, out, units.count() * 2)) == nullptr) return changed();
+    if ((out = begin_delimited(op, out, units.count() * 2)) == nullptr) return full();
     for (uint64_t i = 0; i < units.count(); ++i, out += 2) store_little(out, static_cast<uint16_t>(units[i]));
     return out;
   }
 
   Nested begin(const Operation& op, At out, int64_t) {
-    uint64_t size;
-    if (!next_length(&size)) return {changed(), nullptr};
-    if (size == 0 && op.omit_empty && op.shape == Shape::Single) return {out, out};
-    out = begin_delimited(op, out, size);
-    return out == nullptr ? Nested{changed(), nullptr} : Nested{out, out + size};
+    uint64_t size = 0;
+    if constexpr (kMeasured) {
+      if (!next_length(&size)) return {full(), nullptr};
+      if (size == 0 && is_omitted(op)) return {out, out};
+    }
+    out = kMeasured ? begin_delimited(op, out, size) : open(op, out);
+    return out == nullptr ? Nested{full(), nullptr} : Nested{out, out + size};
   }
 
-  At end(const Operation&, At, const Nested& nested, At out) { return out == nested.end ? out : changed(); }
+  At end(const Operation& op, At at, const Nested& nested, At out) {
+    if constexpr (kMeasured) return out == nested.end ? out : full();
+    return out == nested.at && is_omitted(op) ? at : close(nested.at, out);
+  }
 
-  bool finish(At out) { return out == end_ || !failed(changed()); }
+  bool finish(At out) { return !kMeasured || out == end_ || !failed(full()); }
 
  private:
-  At changed() {
-    reason = Reason::Changed;
+  // There is no room, which there always is for what was measured and is still the same.
+  At full() {
+    reason = kMeasured ? Reason::Changed : Reason::NoRoom;
     return nullptr;
   }
+
+  static bool is_omitted(const Operation& op) { return op.omit_empty && op.shape == Shape::Single; }
 
   bool room(const uint8_t* out, uint64_t size) const { return static_cast<uint64_t>(end_ - out) >= size; }
 
@@ -250,7 +264,7 @@ class ProtobufWriter : public Stop {
       }
       if (high != 0) unit = join_surrogates(high, unit);
       high = 0;
-      if (!room(out, utf8_size(unit))) return changed() != nullptr;
+      if (!room(out, utf8_size(unit))) return full() != nullptr;
       out = put_utf8(out, unit);
       return true;
     });
@@ -270,8 +284,25 @@ class ProtobufWriter : public Stop {
     return put_varint(put_tag(out, op), size);
   }
 
+  // Writes a tag, and keeps a byte for the length; returns nullptr if there is no room.
+  uint8_t* open(const Operation& op, uint8_t* out) const {
+    return room(out, op.tag_size + uint64_t{1}) ? put_tag(out, op) + 1 : nullptr;
+  }
+
+  // Writes the length of what begins at `content` and ends at `out`.
+  At close(uint8_t* content, uint8_t* out) {
+    const auto size = static_cast<uint64_t>(out - content);
+    const uint64_t more = varint_size(size) - 1;
+    if (more != 0) {
+      if (!room(out, more)) return full();
+      std::memmove(content + more, content, static_cast<size_t>(size));
+    }
+    put_varint(content - 1, size);
+    return out + more;
+  }
+
   At delimited(const Operation& op, At out, Text content) {
-    if ((out = begin_delimited(op, out, content.size)) == nullptr) return changed();
+    if ((out = begin_delimited(op, out, content.size)) == nullptr) return full();
     copy(out, content.data, content.size);
     return out + content.size;
   }
@@ -280,6 +311,9 @@ class ProtobufWriter : public Stop {
   uint64_t place_;
   uint8_t* const end_;
 };
+
+using ProtobufWriter = ProtobufOutput<true>;
+using ProtobufAppender = ProtobufOutput<false>;
 
 }  // namespace
 }  // namespace rosidl_proto

@@ -1,5 +1,4 @@
-#include "cdr_reader.hpp"
-#include "protobuf_sinks.hpp"
+#include "protobuf_append.hpp"
 #include "rosidl_adapter_proto/transcode.hpp"
 
 namespace rosidl_proto {
@@ -21,6 +20,12 @@ bool write_ros1_to_proto(const Plan& plan, Input ros1, const Lengths& lengths, u
   ProtobufWriter sink(proto, lengths, first);
   uint8_t* out = proto.data;
   return CdrReader<false, false, ProtobufWriter, Ros1>(plan, ros1, sink, error).run(&out);
+}
+
+bool append_ros1_to_proto(const Plan& plan, Input ros1, Output room, uint64_t* size, Error& error) noexcept {
+  uint8_t nothing;
+  if (ros1.size == 0) ros1.data = &nothing;
+  return append_protobuf<false, Ros1>(plan, ros1, room, size, error);
 }
 
 }  // namespace rosidl_proto

@@ -133,6 +133,7 @@ TEST(messages_that_fail_are_told_and_kept) {
   converter.add(1, {Treatment::CdrToProto, 1, &plan, kMaximumSize, true, 9});
   ConvertedChunk result;
   CHECK(convert(converter, chunk, result) == expected);
+  CHECK_EQUAL(result.failure_counts[1], 1u);
   CHECK_EQUAL(result.failures.size(), 1u);
   CHECK_EQUAL(result.failures[0].index, 1u);
   const Error error = converter.error(result.failures[0].message);

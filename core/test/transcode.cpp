@@ -132,6 +132,26 @@ TEST(packed_fields_are_found_between_groups) {
   CHECK(!find_packed_fields(proto.data(), proto.data() + proto.size() - 1, &number, 1, &other));
 }
 
+TEST(one_step_makes_the_same_where_there_is_room) {
+  for (const char* name : {"every_form", "image"}) {
+    const Plan plan = golden_plan(name);
+    const Bytes cdr = random_cdr(plan, 7);
+    const Input input{cdr.data(), cdr.size()};
+    std::string text;
+    const Bytes proto = to_proto(plan, cdr, &text);
+    for (size_t room = 0; room <= proto.size() + 8; ++room) {
+      Bytes memory(room + 1, 0xee);
+      Error error;
+      uint64_t size = 0;
+      const bool fits = append_cdr_to_proto(plan, input, {memory.data(), room}, &size, error);
+      CHECK_EQUAL(fits, room >= proto.size());
+      CHECK(fits ? size == proto.size() : error.reason == Reason::NoRoom);
+      CHECK(!fits || std::equal(proto.begin(), proto.end(), memory.begin()));
+      CHECK_EQUAL(memory[room], 0xee);
+    }
+  }
+}
+
 TEST(an_empty_result_needs_no_memory) {
   const Plan plan = golden_plan("image");  // in which empty messages are left out
   Error error;

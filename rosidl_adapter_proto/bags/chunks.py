@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from rosidl_adapter_proto.bags.compression import records_of
@@ -86,12 +86,14 @@ class ConvertedChunk:
     Attributes:
         source: The chunk that it was.
         packed: What is to be written; None if no message is left.
-        failures: The messages that could not be converted.
+        failure_counts: How many messages of each topic could not be converted, by its id.
+        failures: The first of them.
         damage: Why the chunk, or some of its messages, could not be read.
     """
 
     source: StoredChunk
     packed: PackedChunk | None = None
+    failure_counts: Mapping[int, int] = field(default_factory=dict)
     failures: Sequence[FailureInChunk] = ()
     damage: BagError | None = None
 
@@ -128,7 +130,7 @@ def convert_chunk(
         return ConvertedChunk(chunk, damage=BagError(f"{chunk.where}: {error}"))
     packed = writer.pack(converted.data) if converted.message_count else None
     failures = _in_topics(records, converted.failures, start_time, end_time) if converted.failures else ()
-    return ConvertedChunk(chunk, packed, failures, damage)
+    return ConvertedChunk(chunk, packed, converted.failure_counts, failures, damage)
 
 
 def _of_known_topics(data: Buffer, topic_ids: Collection[int], where: str) -> tuple[Buffer, BagError | None]:
@@ -166,4 +168,6 @@ def _in_topics(
         counts[topic_id] = number + 1
         if index in by_index:
             found.append(FailureInChunk(by_index[index], number))
+            if len(found) == len(failures):
+                break
     return found

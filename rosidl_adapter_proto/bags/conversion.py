@@ -9,11 +9,12 @@ from pathlib import Path
 
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, message_place
 from rosidl_adapter_proto.converters import ConverterRegistry
+from rosidl_adapter_proto.transcode.records import KEPT_FAILURES
 
 DEFAULT_FORMATS = {PROTOBUF: CDR}
 """What a serialization format is converted to if nobody says; that of others is protobuf."""
 
-SHOWN_FAILURES = 10
+SHOWN_FAILURES = KEPT_FAILURES
 """How many failures are kept word for word."""
 
 

@@ -257,8 +257,10 @@ class _FileConversion:
                 f"; {count} messages before that are whole, and `--on-error skip` converts all that can be read",
             )
         if chunk.failures:
-            self._ledger.add_failures(chunk.failures, self._writer.statistics.message_counts)
-        for topic_id in {each.failure.topic_id for each in chunk.failures} & self._failed_ids.keys():
+            self._ledger.add_failures(
+                chunk.failure_counts, chunk.failures, self._writer.statistics.message_counts
+            )
+        for topic_id in chunk.failure_counts.keys() & self._failed_ids.keys():
             if self._failed_ids[topic_id] not in self._topics:
                 self._add_topic(self._routes[topic_id].topic, self._failed_ids[topic_id])
         if chunk.packed:

@@ -46,34 +46,36 @@ class Ledger:
         unknown = [topic_id for topic_id, route in self._routes.items() if route.reason]
         return self._failed.total() + sum(self._said.get(topic_id, 0) for topic_id in unknown)
 
-    def add_failures(self, failures: Sequence[FailureInChunk], written: Mapping[int, int]) -> None:
+    def add_failures(
+        self, counts: Mapping[int, int], failures: Sequence[FailureInChunk], written: Mapping[int, int]
+    ) -> None:
         """Note the messages of a chunk that could not be converted.
 
         Args:
-            failures: The messages.
+            counts: How many of each topic there are.
+            failures: The first of them.
             written: How many messages of each topic the chunks before it gave.
 
         Raises:
             BagError: The conversion is to stop there.
         """
         before = Counter(written) + self._failed
-        for each in failures:
+        self._failed.update(counts)
+        for each in failures[: SHOWN_FAILURES - len(self.failures)]:
             failure = each.failure
-            self._failed[failure.topic_id] += 1
-            if len(self.failures) < SHOWN_FAILURES:
-                self.failures.append(
-                    FailedMessage(
-                        self._path,
-                        self._routes[failure.topic_id].topic.name,
-                        before[failure.topic_id] + each.number + 1,
-                        failure.log_time,
-                        str(failure.error),
-                    )
+            self.failures.append(
+                FailedMessage(
+                    self._path,
+                    self._routes[failure.topic_id].topic.name,
+                    before[failure.topic_id] + each.number + 1,
+                    failure.log_time,
+                    str(failure.error),
                 )
-            if self._on_error is OnError.STOP:
-                raise BagError(
-                    f"{self.failures[0]}; `--on-error skip` leaves such messages out, and `--on-error copy` copies them"
-                )
+            )
+        if self._on_error is OnError.STOP and failures:
+            raise BagError(
+                f"{self.failures[0]}; `--on-error skip` leaves such messages out, and `--on-error copy` copies them"
+            )
 
     def add_damage(self, damage: BagError, advice: str = "") -> None:
         """Note that the file is damaged.

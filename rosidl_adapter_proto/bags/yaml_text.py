@@ -1,4 +1,4 @@
-"""YAML of a bag, which may come from anywhere: read as plain texts, within limits."""
+"""YAML of bags and plugins, which may come from anywhere: read as plain texts, within limits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def read_yaml(text: str, path: str) -> Node:
         path: The file that it is from, for people.
 
     Raises:
-        BagError: It is no YAML, or nested or large beyond what a bag needs.
+        BagError: It is no YAML, or nested or large beyond what there is need for.
     """
     import yaml
 
@@ -62,7 +62,7 @@ class _Reader:
             if isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
                 if documents > 1:
-                    raise self.error(event, "a second document begins; a bag has one")
+                    raise self.error(event, "a second document begins; there may be one")
                 found = self.node(next(self.events), 0)
         return found
 

@@ -55,6 +55,20 @@ def pack_records(
 def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int], int, int]:
     """Return what `records.RecordIndex` has."""
 
+KEPT_FAILURES: int
+"""Of how many messages of a chunk that fail it is told which they are."""
+
+def read_ros2msg(text: bytes, type_name: str) -> bytes:
+    """Return the packed plan of a type with hashed field numbers, as `Plan.pack` does, without Python.
+
+    Args:
+        text: Its definition and those of the types in it, as recordings have them with the encoding `ros2msg`.
+        type_name: The type that it is recorded for.
+
+    Raises:
+        ValueError: The text is not valid, or not one of messages.
+    """
+
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""
 
@@ -68,9 +82,9 @@ class RecordConverter:
 
     def _convert(
         self, data: Buffer, start_time: int, end_time: int | None, /
-    ) -> tuple[PooledMemory, int, list[tuple[int, int, int, int, TranscodeError]]]:
-        """Return the new chunk, how many messages it has, and of those that failed topic id, log time, sequence number,
-        index and error."""
+    ) -> tuple[PooledMemory, int, dict[int, int], list[tuple[int, int, int, int, TranscodeError]]]:
+        """Return the new chunk, how many messages it has, how many of each topic failed, and of the first of those
+        topic id, log time, sequence number, index and error."""
 
 class Transcoder:
     def __init__(self, plan: bytes, type_name: str, size_limit: int) -> None: ...

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 pack_records = _core.pack_records
 
+KEPT_FAILURES = _core.KEPT_FAILURES
+"""Of how many messages of a chunk that cannot be transcoded it is told what is wrong: nobody reads more."""
+
 NO_END = 2**64
 """No message is recorded at this time or later: log times are unsigned numbers of 64 bits."""
 
@@ -169,11 +172,13 @@ class Converted:
     Attributes:
         data: The new chunk: messages only, in the order of the old one.
         message_count: How many messages it has.
-        failures: The messages that could not be transcoded, in the order of the old chunk.
+        failure_counts: How many messages of each topic could not be transcoded, by the topic id in the old chunk.
+        failures: The first `KEPT_FAILURES` of them, in the order of the old chunk.
     """
 
     data: memoryview = field(repr=False)
     message_count: int
+    failure_counts: Mapping[int, int]
     failures: Sequence[Failure]
 
 
@@ -201,8 +206,10 @@ class RecordConverter(_core.RecordConverter):
             RecordsError: The chunk is damaged, has a message of a topic that has no route, or its result would be
                 larger than 2^32 - 1 bytes.
         """
-        memory, message_count, failures = self._convert(data, *_time_range(start_time, end_time))
-        return Converted(memoryview(memory), message_count, tuple(Failure(*each) for each in failures))
+        memory, message_count, counts, failures = self._convert(data, *_time_range(start_time, end_time))
+        return Converted(
+            memoryview(memory), message_count, counts, tuple(Failure(*each) for each in failures)
+        )
 
 
 _Row = tuple[str, int, Transcoder | None, int | None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from array import array
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,12 @@ from rosbags.typesys import Stores, get_typestore
 from rosidl_adapter_proto import TypeRegistry
 from rosidl_adapter_proto.bags.conversion import Counts
 from rosidl_adapter_proto.bags.convert import convert_bag
-from rosidl_adapter_proto.converters import ConverterRegistry
+from rosidl_adapter_proto.bags.model import Topic
+from rosidl_adapter_proto.bags.plugins import PluginConverter
+from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
+from rosidl_adapter_proto.converters import Converter, ConverterRegistry
 from rosidl_adapter_proto.errors import BagError, ConverterError
+from rosidl_adapter_proto.transcode.records import pack_records, read_records
 from tests.bags.recordings import START, STRING, Recorded, contents, mcap_bytes, strings
 from tests.converters.plugins import JsonConverter, JsonSerializer
 
@@ -78,6 +83,24 @@ def test_a_plugin_that_fails(on_error: str, counts: Counts) -> None:
     assert result.total == counts and result.failures[0].number == 3
     kept = [each for each in contents(Path("out.mcap")).messages if each.data == b"{"]
     assert len(kept) == counts.copied
+
+
+def test_a_chunk_of_failures_keeps_few_errors() -> None:
+    schema = TypeRegistry()[STRING]
+    topic = Topic("/a", STRING, "json")
+    route = TopicRoute(topic, Fate.CONVERTED, topic, schema, schema)
+    converter = PluginConverter({1: route, 2: route}, {2: 9}, Converter("json", "cdr", registry()))
+    numbers = range(3000)
+    topic_ids = array("H", (1 + i % 2 for i in numbers))
+    chunk = pack_records(
+        topic_ids, array("I", numbers), array("Q", numbers), array("Q", numbers), [b"{"] * 3000
+    )
+
+    converted = converter.convert(chunk)
+
+    assert converted.failure_counts == {1: 1500, 2: 1500}
+    assert [each.index for each in converted.failures] == list(range(10))
+    assert (converted.message_count, set(read_records(converted.data).topic_ids)) == (1500, {9})
 
 
 def test_a_selection_with_plugins() -> None:

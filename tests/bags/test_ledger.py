@@ -6,11 +6,13 @@ from typing import Any
 
 import pytest
 
+from rosidl_adapter_proto.bags.chunks import FailureInChunk
 from rosidl_adapter_proto.bags.conversion import Counts, OnError, Settings
 from rosidl_adapter_proto.bags.ledger import Ledger
 from rosidl_adapter_proto.bags.model import Topic
 from rosidl_adapter_proto.bags.routes import Fate, TopicRoute
 from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.transcode.records import Failure
 
 
 def ledger(said: int, fate: Fate = Fate.CONVERTED, **settings: Any) -> Ledger:
@@ -62,3 +64,18 @@ def test_what_is_at_other_times_is_not_lost(times: dict[str, Any]) -> None:
     assert ledger(5, **times).counts({1: 3}) == {"/a": Counts(converted=3, not_selected=2)}
     with pytest.raises(BagError, match="but 6 were found"):
         ledger(5, **times).counts({1: 6})
+
+
+def test_failures_are_counted_and_the_first_are_kept() -> None:
+    skipping = ledger(50, on_error=OnError.SKIP)
+    for chunk in range(2):
+        failures = [
+            FailureInChunk(Failure(1, 100 * chunk + i, 0, i, BagError(f"wrong {i}")), 2 * i) for i in range(6)
+        ]
+        skipping.add_failures({1: 20}, failures, {1: 5 * chunk})
+    assert skipping.failed_count == 40
+    assert [(each.number, each.log_time) for each in skipping.failures] == [
+        *((2 * i + 1, i) for i in range(6)),
+        *((5 + 20 + 2 * i + 1, 100 + i) for i in range(4)),
+    ]
+    assert skipping.counts({1: 10}) == {"/a": Counts(converted=10, skipped=40)}

@@ -206,7 +206,7 @@ WRONG = {
     "a list": ("- 1", "the text: expected names and values"),
     "no YAML": ("a: b: c", "line 1: not valid YAML: mapping values are not allowed in this context"),
     "a tab": ("a:\n\t- b", "line 2: not valid YAML: found character that cannot start any token"),
-    "two documents": ("a: 1\n---\nb: 1", "line 2: a second document begins; a bag has one"),
+    "two documents": ("a: 1\n---\nb: 1", "line 2: a second document begins; there may be one"),
     "twice": ("version: 1\nversion: 2", "line 2: a second version"),
     "a list as a key": ("[1]: 2", "line 1: a key that is not a text"),
     "deep": ("[" * 100 + "]" * 100, "line 1: nested more than 32 deep"),

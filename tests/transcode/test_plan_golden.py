@@ -15,6 +15,7 @@ from ros_types import describe, nasty_types, protobuf_class, struct_type
 
 from rosidl_adapter_proto.interfaces.scalars import SCALARS, CdrForm
 from rosidl_adapter_proto.transcode.plan import UNBOUNDED, VERSION, Operation, Plan, build_plan
+from tests.transcode.recorded_plans import plan_of_text
 
 FOLDER = Path(__file__).parents[1] / "golden" / "plans"
 TYPES = {
@@ -28,6 +29,8 @@ PLANS: dict[str, tuple[str, dict[str, Any]]] = {
     "image": ("test/msg/Image", {"omit_empty_messages": True}),
     "chosen_fields": ("test/msg/Image", {"fields": ["header.stamp.nanosec", "width"]}),
 }
+RECORDED = {"imu": "sensor_msgs/msg/Imu"}
+"""Plans of texts that are in files beside them."""
 
 
 def bound(number: int) -> str:
@@ -91,6 +94,12 @@ def test_golden_plan(name: str, request: pytest.FixtureRequest) -> None:
     compare(name, golden(plan_of(name)), request)
 
 
+@pytest.mark.parametrize("name", RECORDED)
+def test_golden_plan_of_a_recorded_text(name: str, request: pytest.FixtureRequest) -> None:
+    text = (FOLDER / f"{name}_text.txt").read_bytes()
+    compare(name, golden(plan_of_text(text, RECORDED[name])), request)
+
+
 def test_forms(request: pytest.FixtureRequest) -> None:
     compare("forms", forms(), request)
 
@@ -101,4 +110,9 @@ def test_one_plan_has_every_form() -> None:
 
 
 def test_no_other_files() -> None:
-    assert {file.stem for file in FOLDER.iterdir()} == {*PLANS, "forms"}
+    assert {file.stem for file in FOLDER.iterdir()} == {
+        *PLANS,
+        *RECORDED,
+        *(f"{each}_text" for each in RECORDED),
+        "forms",
+    }

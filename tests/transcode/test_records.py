@@ -9,6 +9,7 @@ import mmap
 import pickle
 import random
 import struct
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -22,6 +23,7 @@ from ros_types import struct_type, transcoder
 from rosidl_adapter_proto.errors import Error
 from rosidl_adapter_proto.transcode import RecordsError, TranscodeError, Transcoder, _core
 from rosidl_adapter_proto.transcode.records import (
+    KEPT_FAILURES,
     Converted,
     Direction,
     Failure,
@@ -129,7 +131,7 @@ def test_selection(
     ids = {each[0] for each in messages}
     routes = {each: Route(each) if topic_ids is None or each in topic_ids else None for each in ids}
     converted = RecordConverter(routes).convert(chunk, start_time=start, end_time=end)
-    assert converted == Converted(memoryview(chunk_of(wanted)), len(wanted), ())
+    assert converted == Converted(memoryview(chunk_of(wanted)), len(wanted), {}, ())
 
 
 def test_other_records_are_told() -> None:
@@ -243,7 +245,7 @@ def test_an_empty_chunk() -> None:
     assert messages_of(read_records(b"")) == []
     index = index_records(b"")
     assert (index.data, index.places, index.start_time, index.end_time) == (b"", {}, 0, 0)
-    assert RecordConverter({}).convert(b"") == Converted(memoryview(b""), 0, ())
+    assert RecordConverter({}).convert(b"") == Converted(memoryview(b""), 0, {}, ())
     assert pack([]) == b""
 
 
@@ -308,6 +310,7 @@ def test_routes() -> None:
         (9, 6, 6, 6, GOOD),
     ]
     assert converted.message_count == 6
+    assert converted.failure_counts == {65535: 1}
     (failure,) = converted.failures
     assert (failure.topic_id, failure.log_time, failure.sequence, failure.index) == (65535, 6, 6, 6)
     assert str(failure.error) == (
@@ -355,12 +358,25 @@ def test_messages_are_what_single_calls_make_of_them(
             expected.append((topic_id + 10, *numbers, content))
     assert messages_of(read_records(converted.data)) == expected
     assert converted.message_count == len(expected)
-    assert [failure_row(each) for each in converted.failures] == failures
+    assert converted.failure_counts == Counter(each[0] for each in failures)
+    assert [failure_row(each) for each in converted.failures] == failures[:KEPT_FAILURES]
 
 
 def failure_row(failure: Failure) -> tuple[int, int, int, int, str, tuple[Any, ...]]:
     numbers = (failure.topic_id, failure.log_time, failure.sequence, failure.index)
     return (*numbers, str(failure.error), failure.error.args)
+
+
+@pytest.mark.parametrize("failed_topic_id", [None, 9])
+def test_a_chunk_of_failures_makes_few_errors(failed_topic_id: int | None) -> None:
+    converter = RecordConverter(
+        {topic_id: Route(topic_id, strings(), failed_topic_id=failed_topic_id) for topic_id in (1, 300)}
+    )
+    chunk = simple_chunk(*[(1, GOOD), (1, b""), (300, b"")] * 5000)
+    converted = converter.convert(chunk)
+    assert converted.failure_counts == {1: 5000, 300: 5000}
+    assert converted.message_count == (15_000 if failed_topic_id else 5000)
+    assert [each.index for each in converted.failures] == [1, 2, 4, 5, 7, 8, 10, 11, 13, 14]
 
 
 def test_large_messages() -> None:

@@ -27,10 +27,6 @@ enum class ColumnKind : uint8_t {
   Time = 6,     // a message of the fields `int32 sec`, `uint32 nanosec`, as one int64: nanoseconds
 };
 
-// The numbers of `SERIALIZATIONS` in rosidl_adapter_proto/transcode/columns.py.
-enum class Serialization : uint8_t { Cdr, Protobuf, Ros1 };
-constexpr uint8_t kSerializations = 3;
-
 // No buffer has more bytes than offsets of 32 bits can tell.
 constexpr uint64_t kMaximumColumn = 0x7fffffff;
 

@@ -25,10 +25,14 @@ struct FailedMessage {
   MessageRecord message;
 };
 
+// Of how many messages of a chunk that fail it is told which they are: nobody reads more.
+constexpr size_t kKeptFailures = 10;
+
 struct ConvertedChunk {
   Memory data;
   uint64_t message_count = 0;
-  std::vector<FailedMessage> failures;
+  ByTopic<uint64_t> failure_counts;     // of all that failed, by the topic id in the chunk that came in
+  std::vector<FailedMessage> failures;  // the first of them
 };
 
 // It does not change while it converts: any number of threads may use it.

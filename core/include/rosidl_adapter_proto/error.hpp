@@ -44,6 +44,7 @@ enum class Reason : uint8_t {
   OutOfMemory,
   Partial,
   ColumnsFull,
+  NoRoom,
   Changed,
 };
 constexpr int64_t kNoElement = -1;

@@ -16,6 +16,10 @@ namespace rosidl_proto {
 // The version of packed plans, which is a digit in them: VERSION in plan.py.
 constexpr int kPlanVersion = 2;
 
+// How a packed plan begins, and the sizes of its parts.
+constexpr char kPlanMark[] = {'R', 'P', 'P', '0' + kPlanVersion};
+constexpr size_t kPlanHeaderBytes = 20, kPlanMessageBytes = 24, kPlanOperationBytes = 40;
+
 // Deeper nesting is refused. Plans cannot recur, so this bounds the stack for every input.
 constexpr uint32_t kMaximumDepth = 100;
 
@@ -103,10 +107,12 @@ class Plan {
   const Message& root() const { return messages_[0]; }
   const Message& message(uint32_t index) const { return messages_[index]; }
   uint32_t message_count() const { return static_cast<uint32_t>(messages_.size()); }
+  uint32_t operation_count() const { return static_cast<uint32_t>(operations_.size()); }
   const Operation& operation(uint32_t index) const { return operations_[index]; }
   const Operation* begin(const Message& message) const { return operations_.data() + message.first; }
   const Operation* end(const Message& message) const { return begin(message) + message.count; }
   std::string text(Name name) const { return names_.substr(name.place, name.size); }
+  const std::string& names() const { return names_; }  // all of them
 
   // The operation of `message` with this field number, or nullptr.
   const Operation* find(const Message& message, uint32_t number) const;

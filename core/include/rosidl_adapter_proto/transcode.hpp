@@ -1,5 +1,5 @@
 // CDR to protobuf, protobuf to CDR and ROS 1 to protobuf, each in two steps: measure, then write into a
-// buffer of exactly that size.
+// buffer of exactly that size. Where there is room anyway, protobuf is written in one step.
 //
 // Nothing here throws, keeps state or reads past what it was given. The input may even change between the two
 // steps: the second one checks every read and write again. Stack use is bounded by kMaximumDepth.
@@ -12,6 +12,10 @@
 #include "plan.hpp"
 
 namespace rosidl_proto {
+
+// The numbers of `SERIALIZATIONS` in rosidl_adapter_proto/transcode/columns.py.
+enum class Serialization : uint8_t { Cdr, Protobuf, Ros1 };
+constexpr uint8_t kSerializations = 3;
 
 struct Input {
   const uint8_t* data;
@@ -95,12 +99,17 @@ bool measure_cdr_to_proto(const Plan& plan, Input cdr, uint64_t limit, Lengths& 
 bool write_cdr_to_proto(const Plan& plan, Input cdr, const Lengths& lengths, uint64_t first, Output proto,
                         Error& error) noexcept;
 
+// Validates `cdr` and writes the protobuf message in one step, with bytes behind it that count for nothing.
+// The reason is NoRoom if it does not fit.
+bool append_cdr_to_proto(const Plan& plan, Input cdr, Output room, uint64_t* size, Error& error) noexcept;
+
 // The same for messages as ROS 1 serializes them. A time after 2038 or a duration with negative nanoseconds,
 // which ROS 2 does not have, is an error.
 bool measure_ros1_to_proto(const Plan& plan, Input ros1, uint64_t limit, Lengths& lengths, uint64_t* size,
                            Error& error) noexcept;
 bool write_ros1_to_proto(const Plan& plan, Input ros1, const Lengths& lengths, uint64_t first, Output proto,
                          Error& error) noexcept;
+bool append_ros1_to_proto(const Plan& plan, Input ros1, Output room, uint64_t* size, Error& error) noexcept;
 
 // Finds the size of the CDR message, header included.
 bool measure_proto_to_cdr(const Plan& plan, Input proto, uint64_t limit, Fields& fields, uint64_t* size,

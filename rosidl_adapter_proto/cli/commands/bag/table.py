@@ -7,8 +7,7 @@ from pathlib import Path
 import click
 
 from rosidl_adapter_proto.cli.options import bag_source_options, complete_topic, fields_option, time_options
-from rosidl_adapter_proto.cli.progress import progress_bar
-from rosidl_adapter_proto.cli.texts import show_warnings
+from rosidl_adapter_proto.cli.texts import progress_bar, show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 

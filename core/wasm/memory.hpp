@@ -1,0 +1,27 @@
+// The memory of a plugin. It grows while parsers are made, and never while messages are read.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace rosidl_proto::plugin {
+
+// Whether so many bytes at an address are memory. No host knows address 0.
+bool is_memory(uint64_t address, uint64_t size) noexcept;
+
+// The text at an address, up to its NUL; as far as there is memory, if it has none.
+std::string_view text_at(uint64_t address) noexcept;
+
+// Whether so much can be allocated now, in one piece or in several.
+bool have_memory(uint64_t size) noexcept;
+
+// While there is one of these, the memory keeps its size and place: hosts have pointers into it.
+class FixedMemory {
+ public:
+  FixedMemory() noexcept;
+  FixedMemory(const FixedMemory&) = delete;
+  FixedMemory& operator=(const FixedMemory&) = delete;
+  ~FixedMemory();
+};
+
+}  // namespace rosidl_proto::plugin

@@ -1,0 +1,102 @@
+#include "plugin.hpp"
+
+#include <vector>
+
+#include "memory.hpp"
+#include "rosidl_adapter_proto/schema.hpp"
+
+namespace rosidl_proto::plugin {
+namespace {
+
+#if defined(ROSIDL_PROTO_PLUGIN_ROS2MSG)
+constexpr std::string_view kEncoding = "ros2msg";
+constexpr Serialization kSerialization = Serialization::Cdr;
+
+const char* read_schema(std::string_view schema, std::string_view type_name,
+                        std::vector<uint8_t>* packed_plan, FlatNotes*) {
+  return read_ros2msg(schema, type_name, packed_plan);
+}
+#elif defined(ROSIDL_PROTO_PLUGIN_PROTOBUF)
+constexpr std::string_view kEncoding = "protobuf";
+constexpr Serialization kSerialization = Serialization::Protobuf;
+
+const char* read_schema(std::string_view, std::string_view, std::vector<uint8_t>*, FlatNotes*) {
+  return "not yet";
+}
+#else
+#error "ROSIDL_PROTO_PLUGIN_PROTOBUF or ROSIDL_PROTO_PLUGIN_ROS2MSG says which plugin this is"
+#endif
+
+// What reading a schema allocates at most, if nothing of it is used twice. The names of types have their own
+// limit, since any number of messages can have one in common.
+constexpr uint64_t kMemoryOfAny = 256 << 10, kMemoryOfByte = 100;
+constexpr size_t kMaximumTypeName = 1024;
+
+// A handle is the place of a parser, counted from 1, and above it a number that is another one for each
+// parser at that place.
+constexpr uint32_t kPlaces = 1 << 14, kHandles = 1u << 31;
+
+struct Place {
+  uint32_t handle;  // the last one
+  Parser* parser;
+};
+
+Place places[kPlaces];
+
+Place* find_place(uint64_t handle) {
+  Place& place = places[(handle - 1) % kPlaces];
+  return place.parser != nullptr && place.handle == handle ? &place : nullptr;
+}
+
+}  // namespace
+
+std::string_view encoding() noexcept { return kEncoding; }
+
+std::string_view schema_at(uint64_t address) noexcept { return text_at(address); }
+
+const char* Parser::load(std::string_view type_name, std::string_view schema) noexcept {
+  flattener.reset();
+  if (type_name.size() > kMaximumTypeName) return "the name of the type has more than 1024 bytes";
+  if (schema.size() > kMaximumSchemaSize) return "the schema has more than 4194304 bytes";
+  if (!have_memory(kMemoryOfAny + kMemoryOfByte * schema.size())) return kNoMemory;
+  std::vector<uint8_t> packed_plan;
+  FlatNotes notes;
+  if (const char* problem = read_schema(schema, type_name, &packed_plan, &notes)) return problem;
+  Plan plan;
+  if (const char* problem = plan.load(packed_plan.data(), packed_plan.size())) return problem;
+  auto loaded = std::make_unique<Flattener>();
+  const char* const problem = loaded->load(std::move(plan), std::move(notes), FlatFormat::Page);
+  if (problem == nullptr) flattener = std::move(loaded);
+  return problem;
+}
+
+uint64_t Parser::flatten(FlatFormat format, Input message, Output output) noexcept {
+  const FixedMemory fixed;
+  flattener->set_format(format);
+  error = {};
+  return flattener->flatten(kSerialization, message, output, error);
+}
+
+uint32_t add_parser() noexcept {
+  uint32_t free = 0;
+  while (free < kPlaces && places[free].parser != nullptr) ++free;
+  if (free == kPlaces || !have_memory(sizeof(Parser))) return 0;
+  Place& place = places[free];
+  place.handle = place.handle == 0 ? free + 1 : (place.handle + kPlaces) % kHandles;
+  place.parser = new Parser;
+  return place.handle;
+}
+
+Parser* find_parser(uint64_t handle) noexcept {
+  const Place* const place = find_place(handle);
+  return place == nullptr ? nullptr : place->parser;
+}
+
+void remove_parser(uint64_t handle) noexcept {
+  Place* const place = find_place(handle);
+  if (place == nullptr) return;
+  delete place->parser;
+  place->parser = nullptr;
+}
+
+}  // namespace rosidl_proto::plugin
