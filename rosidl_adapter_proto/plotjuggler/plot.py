@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy
 
 from rosidl_adapter_proto.errors import RequestError
-from rosidl_adapter_proto.plotjuggler.series import BagSeries, Series, read_series
+from rosidl_adapter_proto.plotjuggler.series import BagSeries, read_series
+from rosidl_adapter_proto.plotjuggler.series_model import Series
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -8,7 +8,8 @@ import numpy
 
 from benchmarks.bag_maker import START
 from rosidl_adapter_proto.plotjuggler.plot import Plot, plot_of
-from rosidl_adapter_proto.plotjuggler.series import BagSeries, Series
+from rosidl_adapter_proto.plotjuggler.series import BagSeries
+from rosidl_adapter_proto.plotjuggler.series_model import Series
 
 SECONDS = numpy.arange(1000) / 100
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from benchmarks.bag_maker import START
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.plotjuggler.plot import COLOURS, MAXIMUM_LINES, Line, plot_of
-from rosidl_adapter_proto.plotjuggler.series import BagSeries, Series
+from rosidl_adapter_proto.plotjuggler.series import BagSeries
+from rosidl_adapter_proto.plotjuggler.series_model import Series
 from tests.plotjuggler.plots import one, plot, three
 
 NAN, INFINITY = float("nan"), float("inf")
