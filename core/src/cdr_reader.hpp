@@ -257,7 +257,8 @@ class CdrReader {
       return p + *units * F::kUnitSize;
     } else {
       const uint32_t length = *units;
-      if (!Layout::kTerminated) return input_.need(p, length) == nullptr ? nullptr : p + length;
+      if (F::kIsBytes || !Layout::kTerminated)
+        return input_.need(p, length) == nullptr ? nullptr : p + length;
       if (length == 0) return p;  // Not in the standard, but Fast CDR and others read and write it
       if (input_.need(p, length) == nullptr) return nullptr;
       *units = length - 1;
@@ -275,6 +276,8 @@ class CdrReader {
       const CdrUnits<kSwap> wide(content, units);
       if (kChecked && !check_wide(op, wide)) return failed();
       return take(p, sink_.wstring(op, c.at, element, wide), content);
+    } else if constexpr (F::kIsBytes) {
+      return take(p, sink_.bytes(op, c.at, element, {content, units}), content);
     } else {
       if (Layout::kTerminated && p != content && p[-1] != 0) return fail(Reason::NoTerminator, p - 1);
       const Text text{content, units};

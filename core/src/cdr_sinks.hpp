@@ -43,6 +43,10 @@ class CdrSize : public Stop {
     return within_limit(align(at, 4) + 4 + text.size + 1);
   }
 
+  At bytes(const Operation&, At at, int64_t, Text bytes) {
+    return within_limit(align(at, 4) + 4 + bytes.size);
+  }
+
   template <class Units>
   At wstring(const Operation&, At at, int64_t, const Units& units) {
     return within_limit(align(at, 4) + 4 + units.count() * 4);
@@ -130,6 +134,13 @@ class CdrWriter : public Stop {
     copy(out + 4, text.data, text.size);
     out[4 + text.size] = 0;
     return out + 4 + text.size + 1;
+  }
+
+  At bytes(const Operation&, At out, int64_t, Text bytes) {
+    if ((out = make_room(out, 4, 4 + bytes.size)) == nullptr) return nullptr;
+    store_little(out, static_cast<uint32_t>(bytes.size));
+    copy(out + 4, bytes.data, bytes.size);
+    return out + 4 + bytes.size;
   }
 
   template <class Units>

@@ -103,6 +103,8 @@ class ColumnSink : public Stop {
     return end_string(op, at);
   }
 
+  At bytes(const Operation& op, At at, int64_t element, Text bytes) { return string(op, at, element, bytes); }
+
   // As with text in protobuf, half of a surrogate pair is an error.
   template <class Units>
   At wstring(const Operation& op, At at, int64_t, const Units& units) {

@@ -11,7 +11,7 @@ namespace {
 constexpr const char* kNoMemory = "there is not enough memory for a flattener";
 constexpr const char* kWrongNotes = "the notes are not those of the plan";
 
-constexpr uint64_t kLongestIndex = 12;  // [4294967295]
+constexpr uint64_t kLongestIndices = 24;  // [4294967295][4294967295]
 
 bool is_number(CdrForm form) {
   return visit(form, [](auto each) { return decltype(each)::kIsNumber; });
@@ -82,7 +82,7 @@ const char* Flattener::measure_paths() {
       const Operation& op = plan_.operation(j);
       const uint64_t inside = op.cdr == CdrForm::Message ? 1 + longest[op.message] : 0;
       if (shown_[j].map_key) keys = kMaximumMapKey;
-      longest[i] = std::max(longest[i], shown_[j].name.size + kLongestIndex + inside);
+      longest[i] = std::max(longest[i], shown_[j].name.size + kLongestIndices + inside);
     }
     longest[i] += keys;
     if (longest[i] >= kMaximumFlatKey)

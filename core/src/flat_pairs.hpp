@@ -46,23 +46,35 @@ constexpr BuiltinType builtin_type(CdrForm form) {
     case CdrForm::Int16:
       return BuiltinType::Int16;
     case CdrForm::Uint32:
+    case CdrForm::Varuint32:
       return BuiltinType::Uint32;
     case CdrForm::Int32:
+    case CdrForm::Varint32:
+    case CdrForm::Zigzag32:
       return BuiltinType::Int32;
     case CdrForm::Float:
       return BuiltinType::Float32;
     case CdrForm::Uint64:
+    case CdrForm::Varuint64:
       return BuiltinType::Uint64;
     case CdrForm::Int64:
+    case CdrForm::Varint64:
+    case CdrForm::Zigzag64:
       return BuiltinType::Int64;
     case CdrForm::Double:
       return BuiltinType::Float64;
     case CdrForm::String:
     case CdrForm::Wstring:
+    case CdrForm::Bytes:
     case CdrForm::Message:
       return BuiltinType::String;
   }
   return BuiltinType::String;
+}
+
+template <CdrForm form>
+constexpr BuiltinType builtin_type(Form<form>) {
+  return builtin_type(form);
 }
 
 constexpr bool is_signed(BuiltinType type) { return type >= BuiltinType::Int8 && type <= BuiltinType::Int64; }
@@ -76,26 +88,34 @@ constexpr ModuleKind module_kind(BuiltinType type) {
   return is_signed(type) ? ModuleKind::Int64 : ModuleKind::Uint64;
 }
 
-// What numbers of a form are, and their size. They are handed over as their bits in CDR, without a sign.
-struct NumberType {
-  BuiltinType type;
-  uint8_t size;
-};
-
-template <CdrForm form>
-constexpr NumberType number_type(Form<form>) {
-  return {builtin_type(form), sizeof(typename Form<form>::Raw)};
+// The size of a number.
+constexpr uint8_t size_of(BuiltinType type) {
+  switch (type) {
+    case BuiltinType::Uint8:
+    case BuiltinType::Int8:
+    case BuiltinType::Bool:
+      return 1;
+    case BuiltinType::Uint16:
+    case BuiltinType::Int16:
+      return 2;
+    case BuiltinType::Uint32:
+    case BuiltinType::Int32:
+    case BuiltinType::Float32:
+      return 4;
+    default:
+      return 8;
+  }
 }
 
-// The value of an integer with its sign.
-inline int64_t signed_value(NumberType type, uint64_t raw) {
-  const int above = 64 - 8 * type.size;
-  return is_signed(type.type) ? static_cast<int64_t>(raw << above) >> above : static_cast<int64_t>(raw);
+// Numbers are handed over as their bits in CDR, without a sign. This is the value of an integer.
+inline int64_t signed_value(BuiltinType type, uint64_t raw) {
+  const int above = 64 - 8 * size_of(type);
+  return is_signed(type) ? static_cast<int64_t>(raw << above) >> above : static_cast<int64_t>(raw);
 }
 
 // As modules have it: of an integer its value, of a floating-point number the bits of a double.
-inline uint64_t wide_value(NumberType type, uint64_t raw) {
-  if (type.type != BuiltinType::Float32) return static_cast<uint64_t>(signed_value(type, raw));
+inline uint64_t wide_value(BuiltinType type, uint64_t raw) {
+  if (type != BuiltinType::Float32) return static_cast<uint64_t>(signed_value(type, raw));
   float number;
   const auto bits = static_cast<uint32_t>(raw);
   std::memcpy(&number, &bits, sizeof number);
@@ -154,28 +174,29 @@ class FlatPairs {
   }
 
   // A key is a path and what follows it.
-  ROSIDL_PROTO_NO_INLINE At number(At at, Text path, Text last, NumberType type, uint64_t raw) {
-    if (format_ == FlatFormat::Module)
-      return module_number(at, path, last, module_kind(type.type), wide_value(type, raw));
-    const bool page_boolean = type.type == BuiltinType::Bool && format_ == FlatFormat::Page;
-    uint8_t* const value = pair(at, path, last, page_boolean ? BuiltinType::Uint8 : type.type, type.size);
+  ROSIDL_PROTO_NO_INLINE At number(At at, const Text& path, const Text& last, BuiltinType type,
+                                   uint64_t raw) {
+    if (format_ == FlatFormat::Module) return module_number(at, path, last, type, raw);
+    const uint8_t size = size_of(type);
+    const bool page_boolean = type == BuiltinType::Bool && format_ == FlatFormat::Page;
+    uint8_t* const value = pair(at, path, last, page_boolean ? BuiltinType::Uint8 : type, size);
     if (value == nullptr) return at;
     if (left(value) >= sizeof raw) {
       store_little(value, raw);  // what is too much is written over
     } else {
-      std::memcpy(value, &raw, type.size);
+      std::memcpy(value, &raw, size);
     }
-    return value + type.size;
+    return value + size;
   }
 
-  At string(At at, Text path, Text last, Text text) {
+  At string(At at, const Text& path, const Text& last, Text text) {
     text.size = cut_size(text, largest_size());
     uint8_t* const value = string_pair(at, path, last, text.size);
     return value == nullptr ? at : copy_exactly(value, text.data, text.size);
   }
 
   template <class Units>
-  At wstring(At at, Text path, Text last, const Units& units) {
+  At wstring(At at, const Text& path, const Text& last, const Units& units) {
     uint64_t size = 0, fitting = 0;
     for (uint64_t i = 0; i < units.count();) {
       size += utf8_size(next_character(units, &i));
@@ -189,9 +210,9 @@ class FlatPairs {
     return value;
   }
 
-  bool has_blobs() const { return format_ != FlatFormat::Module; }
-
-  At blob(At at, Text path, Text last, uint32_t offset, uint32_t size) {
+  // Modules have no blobs.
+  At blob(At at, const Text& path, const Text& last, uint32_t offset, uint32_t size) {
+    if (format_ == FlatFormat::Module) return at;
     uint8_t* const value = pair(at, path, last, BuiltinType::Blob, 2 * sizeof(uint32_t));
     if (value == nullptr) return at;
     store_little(value, offset);
@@ -224,7 +245,7 @@ class FlatPairs {
   }
 
   // Writes all of a pair but the value, which takes `size` bytes; returns its place, or nullptr.
-  uint8_t* pair(At at, Text path, Text last, BuiltinType type, uint64_t size) {
+  uint8_t* pair(At at, const Text& path, const Text& last, BuiltinType type, uint64_t size) {
     const uint64_t key = path.size + last.size, needed = size_bytes() + key + 1 + size;
     if (left(at) < needed) return close(at), nullptr;
     ++count_;
@@ -239,7 +260,7 @@ class FlatPairs {
   }
 
   // The same of a pair whose value is text of `size` bytes.
-  uint8_t* string_pair(At at, Text path, Text last, uint64_t size) {
+  uint8_t* string_pair(At at, const Text& path, const Text& last, uint64_t size) {
     const uint64_t whole = size_bytes() + size;
     uint8_t* const value = format_ == FlatFormat::Module
                                ? module_pair(at, path, last, ModuleKind::String, whole)
@@ -251,7 +272,7 @@ class FlatPairs {
   // ----------------------------------------------------------------------------------------------------------
 
   // Names follow the last value. Until that is known they lie at the end of the output, the first one last.
-  uint8_t* module_pair(At at, Text path, Text last, ModuleKind kind, uint64_t size) {
+  uint8_t* module_pair(At at, const Text& path, const Text& last, ModuleKind kind, uint64_t size) {
     const uint64_t key = path.size + last.size;
     if (left(at) < kModuleEntry + size + key) return close(at), nullptr;
     ++count_;
@@ -263,12 +284,16 @@ class FlatPairs {
     return at + kModuleEntry;
   }
 
-  At module_number(At at, Text path, Text last, ModuleKind kind, uint64_t bits) {
-    const uint64_t size = value_size(kind);
-    uint8_t* const value = module_pair(at, path, last, kind, size);
+  At module_number(At at, const Text& path, const Text& last, BuiltinType type, uint64_t raw) {
+    const ModuleKind kind = module_kind(type);
+    uint8_t* const value = module_pair(at, path, last, kind, value_size(kind));
     if (value == nullptr) return at;
-    std::memcpy(value, &bits, static_cast<size_t>(size));
-    return value + size;
+    if (kind == ModuleKind::Bool) {
+      *value = static_cast<uint8_t>(raw);
+    } else {
+      store_little(value, wide_value(type, raw));
+    }
+    return value + value_size(kind);
   }
 
   static uint64_t value_size(ModuleKind kind) { return kind == ModuleKind::Bool ? 1 : 8; }

@@ -20,20 +20,13 @@ inline uint8_t* put_decimal(uint8_t* out, uint64_t number) {
 // The text of an integer or boolean. It points to itself, so it stays where it is.
 class Decimal {
  public:
-  Text of(NumberType type, uint64_t raw) {
-    if (type.type == BuiltinType::Bool) return of_literal(raw != 0 ? "true" : "false");
-    const bool negative = is_signed(type.type) && signed_value(type, raw) < 0;
+  Text of(BuiltinType type, uint64_t raw) {
+    if (type == BuiltinType::Bool) return of_literal(raw != 0 ? "true" : "false");
+    const bool negative = is_signed(type) && signed_value(type, raw) < 0;
     const auto value = static_cast<uint64_t>(signed_value(type, raw));
     text_[0] = '-';
     const uint8_t* const end = put_decimal(text_ + negative, negative ? 0 - value : value);
     return {text_, static_cast<uint64_t>(end - text_)};
-  }
-
-  Text of_index(uint64_t index) {
-    text_[0] = '[';
-    uint8_t* const end = put_decimal(text_ + 1, index);
-    *end = ']';
-    return {text_, static_cast<uint64_t>(end + 1 - text_)};
   }
 
  private:
@@ -41,7 +34,38 @@ class Decimal {
     return {reinterpret_cast<const uint8_t*>(literal), std::strlen(literal)};
   }
 
-  uint8_t text_[24 + kSpill] = {};  // of 64 bits there are at most 20 digits
+  uint8_t text_[24 + kSpill];  // of 64 bits there are at most 20 digits
+};
+
+// `[12]`, the index of an element.
+class IndexText {
+ public:
+  explicit IndexText(uint64_t index) {
+    text_[0] = '[';
+    end_ = put_decimal(text_ + 1, index);
+    *end_ = ']';
+  }
+  IndexText(const IndexText&) = delete;
+  IndexText& operator=(const IndexText&) = delete;
+
+  Text text() const { return {text_, static_cast<uint64_t>(end_ + 1 - text_)}; }
+
+  // Goes to the next index without dividing.
+  void next() {
+    uint8_t* digit = end_ - 1;
+    while (*digit == '9') *digit-- = '0';
+    if (digit == text_) {  // 99 becomes 100
+      text_[1] = '1';
+      *end_++ = '0';
+      *end_ = ']';
+    } else {
+      ++*digit;
+    }
+  }
+
+ private:
+  uint8_t text_[24 + kSpill];
+  uint8_t* end_;
 };
 
 class FlatSink : public Stop {
@@ -68,26 +92,35 @@ class FlatSink : public Stop {
     Input message;
   };
 
-  FlatSink(const Setting& setting, FlatPairs& pairs) : set_(setting), pairs_(pairs) {}
+  FlatSink(const Setting& setting, FlatPairs& pairs)
+      : set_(setting), path_{setting.path, setting.path_size}, pairs_(pairs) {}
 
   static bool failed(At at) { return at == nullptr; }
   static At failure() { return nullptr; }
 
   template <class F>
   ROSIDL_PROTO_INLINE At number(const Operation& op, At at, typename F::Raw raw) {
-    return value(op, at, number_type(F{}), raw);
+    return value(op, at, builtin_type(F{}), raw);
   }
 
   template <class F, class Numbers>
   At numbers(const Operation& op, At at, const Numbers& numbers) {
-    constexpr NumberType type = number_type(F{});
+    constexpr BuiltinType type = builtin_type(F{});
     const uint64_t count = numbers.count();
     const uint8_t* const bytes = numbers.bytes();
-    if (bytes != nullptr || numbers.absent()) return values_together(op, at, type, bytes, count);
-    const uint64_t outside = enter(op), shown = shown_of(count);
-    uint64_t index = 0;
+    const uint64_t outside = enter(op);
+    if (bytes != nullptr || numbers.absent()) {
+      at = values_together(op, at, type, bytes, count);
+      leave(outside);
+      return at;
+    }
+    uint64_t shown = shown_of(count);
+    IndexText index(0);
     const bool good = numbers.each([&](typename F::Raw raw) {
-      if (index < shown) at = element(op, at, index++, type, raw);
+      if (shown == 0) return true;
+      --shown;
+      at = named_or_number(op, at, index.text(), type, raw);
+      index.next();
       return true;
     });
     leave(outside);
@@ -103,22 +136,33 @@ class FlatSink : public Stop {
   At string(const Operation& op, At at, int64_t element, Text text) {
     const FlatField& field = field_of(op);
     if (field.map_key) return push({text.data, cut_size(text, kMaximumMapKey)}), at;
-    return element_of(op, at, element, [&](Text last) { return pairs_.string(at, path(), last, text); });
+    return element_of(op, at, element,
+                      [&](const Text& last) { return pairs_.string(at, path_, last, text); });
   }
 
   template <class Units>
   At wstring(const Operation& op, At at, int64_t element, const Units& units) {
-    return element_of(op, at, element, [&](Text last) { return pairs_.wstring(at, path(), last, units); });
+    return element_of(op, at, element,
+                      [&](const Text& last) { return pairs_.wstring(at, path_, last, units); });
+  }
+
+  // As an array of uint8.
+  At bytes(const Operation& op, At at, int64_t element, Text bytes) {
+    if (element != kNoElement && static_cast<uint64_t>(element) >= shown_) return at;
+    const uint64_t outside = enter(op);
+    if (element != kNoElement) push(IndexText(static_cast<uint64_t>(element)).text());
+    at = values_together(op, at, BuiltinType::Uint8, bytes.data, bytes.size);
+    leave(outside);
+    return at;
   }
 
   Nested begin(const Operation& op, At at, int64_t element) {
     const bool hidden = element != kNoElement && static_cast<uint64_t>(element) >= shown_;
     const Nested nested{at, enter(op), shown_, hidden ? pairs_.close(at) : nullptr};
     if (field_of(op).indexed && !hidden) {
-      Decimal decimal;
-      push(decimal.of_index(static_cast<uint64_t>(element)));
+      push(IndexText(static_cast<uint64_t>(element)).text());
     }
-    set_.path[set_.path_size++] = '/';
+    set_.path[path_.size++] = '/';
     return nested;
   }
 
@@ -134,19 +178,18 @@ class FlatSink : public Stop {
  private:
   const FlatField& field_of(const Operation& op) const { return set_.fields[&op - set_.operations]; }
   Text name(const FlatField& field) const { return {set_.names + field.name.place, field.name.size}; }
-  Text path() const { return {set_.path, set_.path_size}; }
 
-  void push(Text text) {
-    copy_exactly(set_.path + set_.path_size, text.data, text.size);
-    set_.path_size += text.size;
+  void push(const Text& text) {
+    copy_exactly(set_.path + path_.size, text.data, text.size);
+    path_.size += text.size;
   }
   // Appends the name of a field to the path; returns what `leave` needs.
   uint64_t enter(const Operation& op) {
-    const uint64_t outside = set_.path_size;
+    const uint64_t outside = path_.size;
     push(name(field_of(op)));
     return outside;
   }
-  void leave(uint64_t outside) { set_.path_size = outside; }
+  void leave(uint64_t outside) { path_.size = outside; }
 
   // How many elements of an array or sequence are shown.
   uint64_t shown_of(uint64_t count) const {
@@ -159,7 +202,7 @@ class FlatSink : public Stop {
                begin = reinterpret_cast<uintptr_t>(set_.message.data);
     const uint64_t before = place - begin;
     *offset = static_cast<uint32_t>(before);
-    return pairs_.has_blobs() && bytes != nullptr && place >= begin && before <= set_.message.size &&
+    return bytes != nullptr && place >= begin && before <= set_.message.size &&
            count <= set_.message.size - before && before + count <= UINT32_MAX;
   }
 
@@ -169,40 +212,34 @@ class FlatSink : public Stop {
     if (element == kNoElement) return show(name(field_of(op)));
     if (static_cast<uint64_t>(element) >= shown_) return at;
     const uint64_t outside = enter(op);
-    Decimal decimal;
-    at = show(decimal.of_index(static_cast<uint64_t>(element)));
+    at = show(IndexText(static_cast<uint64_t>(element)).text());
     leave(outside);
     return at;
   }
 
   // A number alone: a value, or a key of the map.
-  ROSIDL_PROTO_NO_INLINE At value(const Operation& op, At at, NumberType type, uint64_t raw) {
+  ROSIDL_PROTO_NO_INLINE At value(const Operation& op, At at, BuiltinType type, uint64_t raw) {
     const FlatField& field = field_of(op);
-    if (!field.map_key) return named_or_number(field, at, name(field), type, raw);
+    if (!field.map_key) return named_or_number(op, at, name(field), type, raw);
     Decimal decimal;
     push(decimal.of(type, raw));
     return at;
   }
 
-  // A number of several, the path of which is entered.
-  ROSIDL_PROTO_NO_INLINE At element(const Operation& op, At at, uint64_t index, NumberType type,
-                                    uint64_t raw) {
-    Decimal decimal;
-    return named_or_number(field_of(op), at, decimal.of_index(index), type, raw);
-  }
-
-  // Numbers that lie together, or that are all zero if there are no bytes.
-  ROSIDL_PROTO_NO_INLINE At values_together(const Operation& op, At at, NumberType type, const uint8_t* bytes,
-                                            uint64_t count) {
+  // Numbers that lie together, or that are all zero if there are no bytes; their path is entered.
+  ROSIDL_PROTO_NO_INLINE At values_together(const Operation& op, At at, BuiltinType type,
+                                            const uint8_t* bytes, uint64_t count) {
     uint32_t offset;
-    const bool blob = op.cdr == CdrForm::Uint8 || op.cdr == CdrForm::Int8;
+    const bool blob = op.cdr == CdrForm::Uint8 || op.cdr == CdrForm::Int8 || op.cdr == CdrForm::Bytes;
     if (blob && count > set_.policy.maximum && find_bytes(bytes, count, &offset))
-      return pairs_.blob(at, path(), name(field_of(op)), offset, static_cast<uint32_t>(count));
-    const uint64_t outside = enter(op), shown = shown_of(count);
-    for (uint64_t i = 0; i < shown; ++i) {
-      at = element(op, at, i, type, bytes == nullptr ? 0 : load_raw(bytes + i * type.size, type.size));
+      return pairs_.blob(at, path_, {nullptr, 0}, offset, static_cast<uint32_t>(count));
+    const uint64_t shown = shown_of(count);
+    const uint8_t size = size_of(type);
+    IndexText index(0);
+    for (uint64_t i = 0; i < shown; ++i, index.next()) {
+      const uint64_t raw = bytes == nullptr ? 0 : load_raw(bytes + i * size, size);
+      at = named_or_number(op, at, index.text(), type, raw);
     }
-    leave(outside);
     return at;
   }
 
@@ -220,8 +257,9 @@ class FlatSink : public Stop {
   }
 
   // A value of an enumeration is shown by its name, if it has one.
-  At named_or_number(const FlatField& field, At at, Text last, NumberType type, uint64_t raw) {
-    if (field.names == nullptr) return pairs_.number(at, path(), last, type, raw);
+  At named_or_number(const Operation& op, At at, const Text& last, BuiltinType type, uint64_t raw) {
+    const FlatField& field = field_of(op);
+    if (field.names == nullptr) return pairs_.number(at, path_, last, type, raw);
     using Value = FlatNote::EnumValue;
     const int64_t number = signed_value(type, raw);
     const auto found =
@@ -229,13 +267,14 @@ class FlatSink : public Stop {
                          [](const Value& each, int64_t wanted) { return each.number < wanted; });
     if (found != field.names->end() && found->number == number) {
       const auto* const data = reinterpret_cast<const uint8_t*>(found->name.data());
-      return pairs_.string(at, path(), last, {data, found->name.size()});
+      return pairs_.string(at, path_, last, {data, found->name.size()});
     }
     Decimal decimal;
-    return pairs_.string(at, path(), last, decimal.of(type, raw));
+    return pairs_.string(at, path_, last, decimal.of(type, raw));
   }
 
-  Setting set_;
+  const Setting set_;
+  Text path_;           // of the message that is being read, with what follows it
   uint64_t shown_ = 0;  // elements of the array or sequence that is being read
   FlatPairs& pairs_;
 };

@@ -5,6 +5,7 @@
 #include <exception>
 #include <numeric>
 
+#include "heap_sort.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
 #include "text.hpp"
 
@@ -12,7 +13,6 @@ namespace rosidl_proto {
 namespace {
 
 constexpr const char* kLargeMessage = "a message of this type is larger than 2 GiB";
-constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
 
 // Sizes past what a message can have are all alike; stopping there keeps the arithmetic from overflowing.
 constexpr uint64_t kTooLarge = uint64_t{1} << 40;
@@ -307,7 +307,7 @@ const char* Plan::derive(Message& message) {
 // Links the operations in the order of their field numbers; those that have none come first and are left out.
 const char* Plan::order(Message& message) {
   const auto first = by_number_.begin() + message.first, last = first + message.count;
-  std::sort(first, last,
+  heap_sort(first, last,
             [this](uint32_t a, uint32_t b) { return operations_[a].number < operations_[b].number; });
   auto numbered =
       std::find_if(first, last, [this](uint32_t index) { return operations_[index].number != 0; });

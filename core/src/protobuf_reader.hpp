@@ -326,7 +326,9 @@ class ProtobufReader {
 
   template <class F>
   At string(const Operation& op, At at, int64_t element, Text text) {
-    if constexpr (F::kUnitSize == 1) {
+    if constexpr (F::kIsBytes) {
+      return take(sink_.bytes(op, at, element, text));
+    } else if constexpr (F::kUnitSize == 1) {
       if (kSizes && text.size > op.string_bound &&
           !check_bound(op, text.data, utf8_code_points(text.data, text.size)))
         return failed();

@@ -18,8 +18,8 @@ namespace {
 template <class F>
 inline uint64_t wire_size(typename F::Raw raw) {
   if constexpr (F::kWireType == WireType::Varint) {
-    static_assert(F::kSize <= 2, "longer varints need varint_size");
     const uint64_t value = F::to_wire(raw);
+    if constexpr (F::kSize > 2) return varint_size(value);
     return value > 0xffff ? kMaximumVarintBytes : 1u + (value >= 0x80) + (value >= 0x4000);
   } else {
     return F::kWireType == WireType::Fixed64 ? 8 : 4;
@@ -81,6 +81,8 @@ class ProtobufSize : public Stop {
   At string(const Operation& op, At at, int64_t element, Text text) {
     return element == kNoElement ? delimited(op, at, text.size) : always_delimited(op, at, text.size);
   }
+
+  At bytes(const Operation& op, At at, int64_t element, Text bytes) { return string(op, at, element, bytes); }
 
   template <class Units>
   At wstring(const Operation& op, At at, int64_t element, const Units& units) {
@@ -192,6 +194,10 @@ class ProtobufOutput : public Stop {
 
   At string(const Operation& op, At out, int64_t element, Text text) {
     return text.size == 0 && element == kNoElement ? out : delimited(op, out, text);
+  }
+
+  At bytes(const Operation& op, At out, int64_t element, Text bytes) {
+    return string(op, out, element, bytes);
   }
 
   template <class Units>

@@ -16,7 +16,7 @@
 //   number<F>(op, at, raw)       one number of the form F, as its bits in CDR
 //   numbers<F>(op, at, numbers)  an array or sequence of them: `CdrNumbers` or `ProtobufNumbers`
 //   elements(op, at, count)      an array or sequence of strings or messages begins
-//   string(op, at, element, text), wstring(op, at, element, units)
+//   string(op, at, element, text), wstring(op, at, element, units), bytes(op, at, element, text)
 //   begin(op, at, element)       a submessage begins; returns a `Nested`, whose `at` is where its first field
 //   goes end(op, at, nested, inner)   it ended at `inner`; `at` and `nested` are what `begin` had and gave
 //   finish(at)                   the whole message was there; false if it stops even so
@@ -37,6 +37,7 @@
 
 namespace rosidl_proto {
 
+// Text as UTF-8, or any bytes.
 struct Text {
   const uint8_t* data;
   uint64_t size;

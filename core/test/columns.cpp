@@ -38,7 +38,7 @@ std::string text_of(Columns& columns) {
 }
 
 TEST(columns_get_the_same_from_both_readers) {
-  for (const char* name : {"every_form", "image"}) {
+  for (const char* name : {"every_form", "image", "general"}) {
     const Plan plan = golden_plan(name);
     Columns from_cdr = columns_of(plan), from_proto = columns_of(plan);
     for (uint32_t batch = 0; batch < 3; ++batch) {

@@ -63,7 +63,7 @@ std::string plan_text(const Plan& plan) {
 }
 
 TEST(golden_plans_are_read_as_they_were_written) {
-  for (const char* name : {"every_form", "image", "chosen_fields"}) {
+  for (const char* name : {"every_form", "image", "chosen_fields", "general"}) {
     CHECK_EQUAL(plan_text(golden_plan(name)), golden(name).text);
   }
 }

@@ -8,7 +8,6 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdlib>
-#include <cstring>
 #include <new>
 
 namespace rosidl_proto::plugin {
@@ -29,12 +28,10 @@ bool is_memory(uint64_t address, uint64_t size) noexcept {
   return address != 0 && address <= memory_size() && size <= memory_size() - address;
 }
 
-std::string_view text_at(uint64_t address) noexcept {
-  if (!is_memory(address, 1)) return {};
-  const char* const text = reinterpret_cast<const char*>(static_cast<uintptr_t>(address));
-  const auto rest = static_cast<size_t>(memory_size() - address);
-  const void* const end = std::memchr(text, 0, rest);
-  return {text, end == nullptr ? rest : static_cast<size_t>(static_cast<const char*>(end) - text)};
+std::string_view memory_from(uint64_t address) noexcept {
+  if (!is_memory(address, 0)) return {};
+  return {reinterpret_cast<const char*>(static_cast<uintptr_t>(address)),
+          static_cast<size_t>(memory_size() - address)};
 }
 
 bool have_memory(uint64_t size) noexcept {

@@ -9,8 +9,8 @@ namespace rosidl_proto::plugin {
 // Whether so many bytes at an address are memory. No host knows address 0.
 bool is_memory(uint64_t address, uint64_t size) noexcept;
 
-// The text at an address, up to its NUL; as far as there is memory, if it has none.
-std::string_view text_at(uint64_t address) noexcept;
+// All memory from an address on; none if there is no such address.
+std::string_view memory_from(uint64_t address) noexcept;
 
 // Whether so much can be allocated now, in one piece or in several.
 bool have_memory(uint64_t size) noexcept;

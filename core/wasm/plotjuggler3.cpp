@@ -1,15 +1,22 @@
 // PlotJuggler 3: the functions in its document, and those that its releases call instead. Both make parsers
 // with the same one, so which function a message is given to says how its pairs are written.
-#include <algorithm>
 #include <cstdlib>
 
+#include "encoding.hpp"
 #include "memory.hpp"
 #include "plugin.hpp"
 
 namespace rosidl_proto::plugin {
+
+// Written by rosidl_adapter_proto/plotjuggler/build.py.
+extern const char kManifest[];
+
 namespace {
 
-constexpr char kManifest[] = ROSIDL_PROTO_MANIFEST;
+std::string_view text_at(uint32_t address) {
+  const std::string_view memory = memory_from(address);
+  return memory.substr(0, memory.find('\0'));
+}
 
 uint32_t flatten(uint32_t self, uint32_t data, uint32_t size, uint32_t output, FlatFormat format) {
   Parser* const parser = find_parser(self);
@@ -32,7 +39,7 @@ ROSIDL_PROTO_EXPORT(pj_parser_create)
 uint32_t pj_parser_create(uint32_t, uint32_t type_name, uint32_t schema) {
   const uint32_t self = add_parser();
   if (self == 0) return 0;
-  if (find_parser(self)->load(text_at(type_name), schema_at(schema)) == nullptr) return self;
+  if (find_parser(self)->load(text_at(type_name), schema_in(memory_from(schema))) == nullptr) return self;
   remove_parser(self);
   return 0;
 }

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "encoding.hpp"
 #include "memory.hpp"
 #include "plugin.hpp"
 #include "rosidl_adapter_proto/wire.hpp"
@@ -74,7 +75,7 @@ int32_t bind(Parser* parser, uint64_t address, uint64_t size) {
   if (!binding.text(Binding::Encoding, size, &encoding_name) ||
       !binding.text(Binding::TypeName, size, &type_name) || !binding.text(Binding::Schema, size, &schema))
     return answer(parser, Answer::Malformed, "the binding has a text that is not in it");
-  if (binding.route() != Binding::kScalarRoute || encoding_name != encoding())
+  if (binding.route() != Binding::kScalarRoute || encoding_name != kEncoding)
     return answer(parser, Answer::Declined, "the module has scalars of one encoding only");
   if (const char* wrong = parser->load(type_name, schema))
     return answer(parser, wrong == kNoMemory ? Answer::NoMemory : Answer::Failed, wrong);

@@ -2,30 +2,12 @@
 
 #include <vector>
 
+#include "encoding.hpp"
 #include "memory.hpp"
 #include "rosidl_adapter_proto/schema.hpp"
 
 namespace rosidl_proto::plugin {
 namespace {
-
-#if defined(ROSIDL_PROTO_PLUGIN_ROS2MSG)
-constexpr std::string_view kEncoding = "ros2msg";
-constexpr Serialization kSerialization = Serialization::Cdr;
-
-const char* read_schema(std::string_view schema, std::string_view type_name,
-                        std::vector<uint8_t>* packed_plan, FlatNotes*) {
-  return read_ros2msg(schema, type_name, packed_plan);
-}
-#elif defined(ROSIDL_PROTO_PLUGIN_PROTOBUF)
-constexpr std::string_view kEncoding = "protobuf";
-constexpr Serialization kSerialization = Serialization::Protobuf;
-
-const char* read_schema(std::string_view, std::string_view, std::vector<uint8_t>*, FlatNotes*) {
-  return "not yet";
-}
-#else
-#error "ROSIDL_PROTO_PLUGIN_PROTOBUF or ROSIDL_PROTO_PLUGIN_ROS2MSG says which plugin this is"
-#endif
 
 // What reading a schema allocates at most, if nothing of it is used twice. The names of types have their own
 // limit, since any number of messages can have one in common.
@@ -49,10 +31,6 @@ Place* find_place(uint64_t handle) {
 }
 
 }  // namespace
-
-std::string_view encoding() noexcept { return kEncoding; }
-
-std::string_view schema_at(uint64_t address) noexcept { return text_at(address); }
 
 const char* Parser::load(std::string_view type_name, std::string_view schema) noexcept {
   flattener.reset();

@@ -20,12 +20,6 @@ constexpr uint64_t kOutputSize = 1 << 20;
 
 constexpr const char* kNoMemory = "there is not enough memory";
 
-// The encoding of messages, as PlotJuggler names it.
-std::string_view encoding() noexcept;
-
-// The schema at an address that a host gives no size for. There is a NUL behind it.
-std::string_view schema_at(uint64_t address) noexcept;
-
 struct Parser {
   std::unique_ptr<Flattener> flattener;  // none before there is a schema
   std::unique_ptr<uint8_t[]> output;     // of PlotJuggler 4; others have their own

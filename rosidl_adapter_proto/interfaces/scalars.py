@@ -26,7 +26,11 @@ class Family(Enum):
 
 
 class CdrForm(IntEnum):
-    """How one element lies in CDR (DDS-XTypes 1.3, section 7.4.1.1), and what its values are; as in `core/`."""
+    """How one element lies in CDR (DDS-XTypes 1.3, section 7.4.1.1), and what its values are; as in `core/`.
+
+    Those behind `MESSAGE` are of protobuf messages that do not come from ROS (`transcode/protobuf_plan.py`): in CDR
+    they are what another form is, and in protobuf they are not.
+    """
 
     BOOLEAN = 1
     UINT8 = 2
@@ -44,6 +48,13 @@ class CdrForm(IntEnum):
     STRING = 14
     WSTRING = 15
     MESSAGE = 16
+    VARINT32 = 17
+    VARUINT32 = 18
+    VARINT64 = 19
+    VARUINT64 = 20
+    ZIGZAG32 = 21
+    ZIGZAG64 = 22
+    BYTES = 23
 
 
 @dataclass(frozen=True)

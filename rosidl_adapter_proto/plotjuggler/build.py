@@ -6,6 +6,7 @@ them, and of PlotJuggler 4, and imports nothing.
 
 from __future__ import annotations
 
+import hashlib
 import importlib.metadata
 import json
 import os
@@ -27,34 +28,22 @@ INSTALL = f"pip install ziglang=={ZIGLANG}"
 class Recipe:
     """What differs between the plugins."""
 
-    encoding: str  # as PlotJuggler names the encodings of messages
-    define: str  # chooses the reader of schemas in core/wasm/plugin.cpp
+    encoding: str  # of messages, as PlotJuggler names it
     description: str
 
 
-RECIPES = (
-    Recipe(
-        "protobuf", "ROSIDL_PROTO_PLUGIN_PROTOBUF", "Series of protobuf messages, by their FileDescriptorSet"
-    ),
-    Recipe("ros2msg", "ROSIDL_PROTO_PLUGIN_ROS2MSG", "Series of ROS 2 messages in CDR, by their definition"),
-)
+RECIPES = (Recipe("ros2msg", "Series of ROS 2 messages in CDR, by the text that defines them"),)
 
 # Relative to the folder of the core, where the compiler runs: so no path of this machine comes into a plugin.
 _SOURCES = (
     *("wasm/memory.cpp", "wasm/plotjuggler3.cpp", "wasm/plotjuggler4.cpp", "wasm/plugin.cpp"),
     *("src/error.cpp", "src/flat.cpp", "src/plan.cpp", "src/proto_to_cdr.cpp", "src/text.cpp"),
-    *(
-        "src/schema/field_numbers.cpp",
-        "src/schema/lines.cpp",
-        "src/schema/packed_plan.cpp",
-        "src/schema/ros2msg.cpp",
-    ),
 )
 # Only what every host has: WebAssembly 1.0, and copying of memory. 256 MiB is what PlotJuggler 4 allows.
 _MEMORY_MAXIMUM = 256 << 20
 _STACK_SIZE = 512 << 10
-_COMPILER = (
-    *(sys.executable, "-m", "ziglang", "c++", "-target", "wasm32-wasi", "-mcpu=mvp+bulk_memory"),
+_FLAGS = (
+    *("-target", "wasm32-wasi", "-mcpu=mvp+bulk_memory"),
     *("-std=c++17", "-Os", "-fignore-exceptions", "-fno-rtti", "-ffunction-sections", "-fdata-sections"),
     *("-Wall", "-Wextra", "-Werror", "-Iinclude", "-Isrc"),
     *("-mexec-model=reactor", "-Wl,--gc-sections", "-Wl,--strip-all"),
@@ -84,8 +73,7 @@ def build_plugins(output: Path) -> list[Path]:
         output.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".building-", dir=output) as folder:
             for recipe in RECIPES:
-                built = Path(folder) / f"{recipe.encoding}.wasm"
-                _compile(recipe, built)
+                built = _compile(recipe, Path(folder).resolve())
                 built.write_bytes(built.read_bytes() + _custom_section(_module_manifest(recipe)))
                 built.chmod(0o644)
                 plugins.append(built.replace(output / built.name))
@@ -101,6 +89,17 @@ def core_folder() -> Path:
     package = Path(rosidl_adapter_proto.__file__).parent
     shipped = package / "core"
     return shipped if shipped.is_dir() else package.parent / "core"
+
+
+def source_digest() -> str:
+    """Return a short name for all that plugins are made of, the same wherever the same sources are."""
+    core = core_folder()
+    files = [file for part in ("include", "src", "wasm") for file in (core / part).rglob("*.?pp")]
+    digest = hashlib.sha256(rosidl_adapter_proto.__version__.encode())
+    for file in [Path(__file__), *sorted(files)]:
+        digest.update(f"\n{file.name}\n".encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def manifest_text(recipe: Recipe) -> str:
@@ -145,21 +144,34 @@ def _check_compiler() -> None:
         raise PluginError(f"building plugins needs ziglang {ZIGLANG}, and {version} is installed: {INSTALL}")
 
 
-def _compile(recipe: Recipe, output: Path) -> None:
-    manifest = json.dumps(manifest_text(recipe), ensure_ascii=True)  # a C string as well
-    command = [
-        *_COMPILER,
-        *(f"-D{recipe.define}", f"-DROSIDL_PROTO_MANIFEST={manifest}"),
-        *_SOURCES,
-        *("-o", str(output.resolve())),
-    ]
-    environment = {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(output.parent.resolve() / "cache")}
-    process = subprocess.run(command, cwd=core_folder(), env=environment, capture_output=True, check=False)
+def _compile(recipe: Recipe, folder: Path) -> Path:
+    """Compile a plugin into a folder, in which a later one finds what both have in common."""
+    manifest, plugin = folder / "manifest.cpp", folder / f"{recipe.encoding}.wasm"
+    text = json.dumps(manifest_text(recipe))  # C++ writes such text alike
+    manifest.write_text(
+        "namespace rosidl_proto::plugin {\n"
+        f"extern const char kManifest[];\nconst char kManifest[] = {text};\n"
+        "}  // namespace rosidl_proto::plugin\n",
+        encoding="utf-8",
+    )
+    core = core_folder()
+    schema = [file.relative_to(core).as_posix() for file in sorted(core.glob("src/schema/*.cpp"))]
+    process = subprocess.run(
+        [
+            *(sys.executable, "-m", "ziglang", "c++", *_FLAGS),
+            *(*_SOURCES, *schema, f"wasm/{recipe.encoding}.cpp", str(manifest), "-o", str(plugin)),
+        ],
+        cwd=core,
+        env={**os.environ, "ZIG_LOCAL_CACHE_DIR": str(folder / "cache")},
+        capture_output=True,
+        check=False,
+    )
     if process.returncode != 0:
         said = process.stderr.decode(errors="replace").strip()
         raise PluginError(
-            f"the compiler failed to build {output.name}, with exit code {process.returncode}:\n{said}"
+            f"the compiler failed to build {plugin.name}, with exit code {process.returncode}:\n{said}"
         )
+    return plugin
 
 
 def _custom_section(content: bytes) -> bytes:

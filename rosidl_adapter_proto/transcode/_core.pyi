@@ -55,9 +55,6 @@ def pack_records(
 def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int], int, int]:
     """Return what `records.RecordIndex` has."""
 
-KEPT_FAILURES: int
-"""Of how many messages of a chunk that fail it is told which they are."""
-
 def read_ros2msg(text: bytes, type_name: str) -> bytes:
     """Return the packed plan of a type with hashed field numbers, as `Plan.pack` does, without Python.
 
@@ -68,6 +65,23 @@ def read_ros2msg(text: bytes, type_name: str) -> bytes:
     Raises:
         ValueError: The text is not valid, or not one of messages.
     """
+
+_FlatNote = tuple[tuple[tuple[int, str], ...], bool, bool]
+"""The attributes of `protobuf_plan.FlatNote`."""
+
+def read_file_descriptor_set(data: bytes, type_name: str) -> tuple[bytes, list[_FlatNote]]:
+    """Return the packed plan of a message and its notes, as `protobuf_plan` makes them, without Python.
+
+    Args:
+        data: A serialized `FileDescriptorSet`.
+        type_name: The full name of the message; a dot may stand before it.
+
+    Raises:
+        ValueError: The set is damaged or too large, or does not have the message.
+    """
+
+KEPT_FAILURES: int
+"""Of how many messages of a chunk that fail it is told which they are."""
 
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""

@@ -24,6 +24,7 @@ SERIALIZATIONS = ("cdr", "protobuf", "ros1")
 TIME = "builtin_interfaces/msg/Time"
 DURATION = "builtin_interfaces/msg/Duration"
 
+_TEXTS = (CdrForm.STRING, CdrForm.WSTRING, CdrForm.BYTES)
 _TIME_FORMS = {"sec": CdrForm.INT32, "nanosec": CdrForm.UINT32}
 
 
@@ -99,7 +100,7 @@ class _Layout:
             return self._element(name, operation)
         is_array = shape is Shape.ARRAY
         length = operation.count if is_array else 0
-        if cdr not in (CdrForm.STRING, CdrForm.WSTRING, CdrForm.MESSAGE):
+        if cdr not in (*_TEXTS, CdrForm.MESSAGE):
             return Column(name, ColumnKind.NUMBERS, cdr, is_array, length)
         self._add()
         items = (self._element("item", operation),)
@@ -107,7 +108,7 @@ class _Layout:
 
     def _element(self, name: str, operation: Operation) -> Column:
         cdr = operation.cdr
-        if cdr in (CdrForm.STRING, CdrForm.WSTRING):
+        if cdr in _TEXTS:
             return Column(name, ColumnKind.TEXT, cdr)
         if cdr is not CdrForm.MESSAGE:
             return Column(name, ColumnKind.NUMBER, cdr)

@@ -33,14 +33,16 @@ UNBOUNDED = 0xFFFFFFFF
 NOT_IN_PROTOBUF = 0
 """The protobuf form of a field that is skipped when CDR is read, and zeros when it is written."""
 
-_PROTOBUF_TYPES = {
+PROTOBUF_TYPES = {
     name: getattr(FieldDescriptor, f"TYPE_{name.upper()}")
     for name in (
         *("double", "float", "int32", "int64", "uint32", "uint64", "sint32", "sint64", "fixed32", "fixed64"),
         *("sfixed32", "sfixed64", "bool", "string", "bytes", "message", "group", "enum"),
     )
 }
-_PROTOBUF_TYPE_NAMES = {number: name for name, number in _PROTOBUF_TYPES.items()}
+"""The numbers of protobuf types by their names."""
+
+_PROTOBUF_TYPE_NAMES = {number: name for name, number in PROTOBUF_TYPES.items()}
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,23 @@ class _Names:
             self._places[name] = len(self.text), len(encoded)
             self.text += encoded
         return self._places[name]
+
+
+def plan_of_parts(messages: list[MessagePlan], *, partial: bool = False) -> Plan:
+    """Return the plan of the last message; in `messages`, parts come first and operations count from there."""
+    last = len(messages) - 1
+
+    def from_outermost(operation: Operation) -> Operation:
+        nested = operation.cdr is CdrForm.MESSAGE
+        return replace(operation, message=last - operation.message) if nested else operation
+
+    return Plan(
+        tuple(
+            replace(each, operations=tuple(map(from_outermost, each.operations)))
+            for each in reversed(messages)
+        ),
+        partial,
+    )
 
 
 _Paths = frozenset[tuple[str, ...]]
@@ -253,19 +272,7 @@ class _Builder:
 
     def plan(self, *, partial: bool) -> Plan:
         """Return the plan of the message that was added last."""
-        last = len(self._messages) - 1
-
-        def from_outermost(operation: Operation) -> Operation:
-            nested = operation.cdr is CdrForm.MESSAGE
-            return replace(operation, message=last - operation.message) if nested else operation
-
-        return Plan(
-            tuple(
-                replace(each, operations=tuple(map(from_outermost, each.operations)))
-                for each in reversed(self._messages)
-            ),
-            partial,
-        )
+        return plan_of_parts(self._messages, partial=partial)
 
     def _operations(self, part: _Part, outer: tuple[str, ...]) -> Iterator[Operation]:
         type_name, descriptor = part.type_name, part.descriptor
@@ -364,7 +371,7 @@ def _form(where: str, element: Scalar | TypeName) -> _Form:
         raise SchemaError(
             f"{where}: {element.name} has no one layout in CDR and cannot be transcoded; make the field a double"
         )
-    single, many = _PROTOBUF_TYPES[element.protobuf], _PROTOBUF_TYPES[element.many]
+    single, many = PROTOBUF_TYPES[element.protobuf], PROTOBUF_TYPES[element.many]
     return _Form(element.type_id, element.cdr, single, many, element.repeated)
 
 
@@ -372,14 +379,15 @@ def _check_protobuf_type(where: str, form: _Form, shape: Shape, field: FieldDesc
     single = shape is Shape.SINGLE
     repeated = not single and form.repeated
     expected = form.single if single else form.many
-    if field.type != expected or _is_repeated(field) != repeated:
+    if field.type != expected or is_repeated(field) != repeated:
         raise SchemaError(
-            f"{where}: the protobuf field is {_type_text(field.type, _is_repeated(field))} where"
+            f"{where}: the protobuf field is {_type_text(field.type, is_repeated(field))} where"
             f" {_type_text(expected, repeated)} is needed; generate its message again"
         )
 
 
-def _is_repeated(field: FieldDescriptor) -> bool:
+def is_repeated(field: FieldDescriptor) -> bool:
+    """Tell whether a field is repeated."""
     # `label` warns in newer releases of protobuf; `is_repeated` does not exist in older ones.
     if hasattr(field, "is_repeated"):
         return bool(field.is_repeated)

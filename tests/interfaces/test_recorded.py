@@ -79,26 +79,27 @@ def fields(catalog: Catalog, name: str) -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        TRACK,
-        TRACK.rstrip("\n"),
-        TRACK.replace("\n", "\r\n"),
-        TRACK.replace(RULE, f"\n{RULE}"),  # as rosbag2 has it since Jazzy
-        TRACK.replace("MSG: my_msgs/Point", "MSG: my_msgs/msg/Point"),
-        TRACK.replace("MSG: my_msgs/Point", "MSG: Point"),
-        TRACK.replace("Point[]", "my_msgs/Point[]"),
-        TRACK.replace("Point[]", "my_msgs/msg/Point[]"),
-        TRACK.replace("std_msgs/Header header", "Header header"),
-        TRACK.replace("builtin_interfaces/Time stamp", "time stamp"),
-        TRACK.replace("float64 x", "  float64 x # where it is, in C:\\unknown"),
-        TRACK + TRACK[TRACK.index(RULE) :],  # the same ones again, as rosbag2 of Humble has them
-        f"{RULE}\nMSG: my_msgs/Track\n{TRACK}",
-        f"\ufeff{TRACK}",
-        TRACK.replace("string frame_id", "string frame_id # K\xf6ln"),
-    ],
-)
+WAYS = [
+    TRACK,
+    TRACK.rstrip("\n"),
+    TRACK.replace("\n", "\r\n"),
+    TRACK.replace(RULE, f"\n{RULE}"),  # as rosbag2 has it since Jazzy
+    TRACK.replace("MSG: my_msgs/Point", "MSG: my_msgs/msg/Point"),
+    TRACK.replace("MSG: my_msgs/Point", "MSG: Point"),
+    TRACK.replace("Point[]", "my_msgs/Point[]"),
+    TRACK.replace("Point[]", "my_msgs/msg/Point[]"),
+    TRACK.replace("std_msgs/Header header", "Header header"),
+    TRACK.replace("builtin_interfaces/Time stamp", "time stamp"),
+    TRACK.replace("float64 x", "  float64 x # where it is, in C:\\unknown"),
+    TRACK + TRACK[TRACK.index(RULE) :],  # the same ones again, as rosbag2 of Humble has them
+    f"{RULE}\nMSG: my_msgs/Track\n{TRACK}",
+    f"\ufeff{TRACK}",
+    TRACK.replace("string frame_id", "string frame_id # K\xf6ln"),
+]
+"""Ways to write the definition of the same type."""
+
+
+@pytest.mark.parametrize("text", WAYS)
 def test_ways_to_write_the_same_type(text: str) -> None:
     assert hash_of(text) == hash_of(TRACK)
     expected = [

@@ -11,10 +11,13 @@ from typing import Any
 
 import pytest
 from google.protobuf.descriptor import FieldDescriptor
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from protobuf_types import descriptor_of, general_file
 from ros_types import describe, nasty_types, protobuf_class, struct_type
 
 from rosidl_adapter_proto.interfaces.scalars import SCALARS, CdrForm
 from rosidl_adapter_proto.transcode.plan import UNBOUNDED, VERSION, Operation, Plan, build_plan
+from rosidl_adapter_proto.transcode.protobuf_plan import NATURAL_FORMS, protobuf_plan
 from tests.transcode.recorded_plans import plan_of_text
 
 FOLDER = Path(__file__).parents[1] / "golden" / "plans"
@@ -31,6 +34,8 @@ PLANS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 RECORDED = {"imu": "sensor_msgs/msg/Imu"}
 """Plans of texts that are in files beside them."""
+GENERAL, GENERAL_SET = "general", "general_set"
+"""The plan of a message that does not come from ROS, and the descriptor set that it is of."""
 
 
 def bound(number: int) -> str:
@@ -55,10 +60,13 @@ def plan_text(plan: Plan) -> str:
     return text
 
 
+def in_lines(content: bytes) -> str:
+    digits = content.hex()
+    return "bytes\n" + "".join(f"{digits[i : i + 100]}\n" for i in range(0, len(digits), 100))
+
+
 def golden(plan: Plan) -> str:
-    packed = plan.pack().hex()
-    lines = (packed[i : i + 100] for i in range(0, len(packed), 100))
-    return f"{plan_text(plan)}bytes\n" + "".join(f"{line}\n" for line in lines)
+    return plan_text(plan) + in_lines(plan.pack())
 
 
 def forms() -> str:
@@ -67,6 +75,9 @@ def forms() -> str:
     for scalar in SCALARS.values():
         if scalar.cdr is not None:
             facts.setdefault(scalar.cdr, set()).add((scalar.protobuf, scalar.many, scalar.largest_character))
+    for protobuf, (_, form) in NATURAL_FORMS.items():
+        if protobuf != "enum":  # which is an int32 on the wire
+            facts.setdefault(form, set()).add((protobuf, protobuf, 0))
     text = ""
     for form in CdrForm:
         ((one, many, largest_character),) = facts[form]
@@ -76,6 +87,9 @@ def forms() -> str:
 
 
 def plan_of(name: str) -> Plan:
+    if name == GENERAL:
+        plan, _ = protobuf_plan(descriptor_of([general_file()], "test.General"))
+        return plan
     type_name, options = PLANS[name]
     message_class = protobuf_class(TYPES, type_name, hashed=name == "image")
     return build_plan(describe(TYPES, type_name), message_class.DESCRIPTOR, **options)
@@ -89,7 +103,7 @@ def compare(name: str, text: str, request: pytest.FixtureRequest) -> None:
     assert text == file.read_text(encoding="utf-8"), f"{file}: if it is meant, run: make golden"
 
 
-@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("name", [*PLANS, GENERAL])
 def test_golden_plan(name: str, request: pytest.FixtureRequest) -> None:
     compare(name, golden(plan_of(name)), request)
 
@@ -100,13 +114,20 @@ def test_golden_plan_of_a_recorded_text(name: str, request: pytest.FixtureReques
     compare(name, golden(plan_of_text(text, RECORDED[name])), request)
 
 
+def test_general_set(request: pytest.FixtureRequest) -> None:
+    content = FileDescriptorSet(file=[general_file()]).SerializeToString(deterministic=True)
+    compare(GENERAL_SET, f"a descriptor set\n{in_lines(content)}", request)
+
+
 def test_forms(request: pytest.FixtureRequest) -> None:
     compare("forms", forms(), request)
 
 
-def test_one_plan_has_every_form() -> None:
-    plan = plan_of("every_form")
-    assert {each.cdr for message in plan.messages for each in message.operations} == set(CdrForm)
+def test_plans_have_every_form() -> None:
+    plans = plan_of("every_form"), plan_of(GENERAL)
+    found = [{each.cdr for message in plan.messages for each in message.operations} for plan in plans]
+    assert found[0] == {each for each in CdrForm if each <= CdrForm.MESSAGE}
+    assert found[0] | found[1] == set(CdrForm)
 
 
 def test_no_other_files() -> None:
@@ -114,5 +135,6 @@ def test_no_other_files() -> None:
         *PLANS,
         *RECORDED,
         *(f"{each}_text" for each in RECORDED),
+        *(GENERAL, GENERAL_SET),
         "forms",
     }

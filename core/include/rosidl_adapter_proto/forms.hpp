@@ -23,7 +23,8 @@ namespace rosidl_proto {
 #endif
 
 // How one element lies in CDR, and what its values are: the names and numbers of `CdrForm` in
-// rosidl_adapter_proto/interfaces/scalars.py.
+// rosidl_adapter_proto/interfaces/scalars.py. Those behind `Message` are of protobuf messages that do not
+// come from ROS: in CDR they are what another form is, and in protobuf they are not.
 #define ROSIDL_PROTO_CDR_FORMS(X) \
   X(Boolean, 1)                   \
   X(Uint8, 2)                     \
@@ -40,7 +41,14 @@ namespace rosidl_proto {
   X(Double, 13)                   \
   X(String, 14)                   \
   X(Wstring, 15)                  \
-  X(Message, 16)
+  X(Message, 16)                  \
+  X(Varint32, 17)                 \
+  X(Varuint32, 18)                \
+  X(Varint64, 19)                 \
+  X(Varuint64, 20)                \
+  X(Zigzag32, 21)                 \
+  X(Zigzag64, 22)                 \
+  X(Bytes, 23)
 
 enum class CdrForm : uint8_t {
 #define ROSIDL_PROTO_FORM(name, number) name = number,
@@ -53,6 +61,8 @@ enum class ProtobufForm : uint8_t {
   None = 0,  // not in protobuf: skipped when CDR is read, zeros when it is written
   Double = 1,
   Float = 2,
+  Int64 = 3,
+  Uint64 = 4,
   Int32 = 5,
   Fixed64 = 6,
   Fixed32 = 7,
@@ -63,6 +73,8 @@ enum class ProtobufForm : uint8_t {
   Uint32 = 13,
   Sfixed32 = 15,
   Sfixed64 = 16,
+  Sint32 = 17,
+  Sint64 = 18,
 };
 
 // https://protobuf.dev/programming-guides/encoding/#structure
@@ -79,7 +91,11 @@ constexpr WireType wire_type_of(ProtobufForm form) {
   switch (form) {
     case ProtobufForm::Bool:
     case ProtobufForm::Int32:
+    case ProtobufForm::Int64:
     case ProtobufForm::Uint32:
+    case ProtobufForm::Uint64:
+    case ProtobufForm::Sint32:
+    case ProtobufForm::Sint64:
       return WireType::Varint;
     case ProtobufForm::Fixed32:
     case ProtobufForm::Sfixed32:
@@ -174,10 +190,32 @@ struct SmallForm
   }
 };
 
+// A number of 32 or 64 bits, which protobuf has as a varint: negative ones sign-extended to 64 bits, and cut
+// when it is read.
+template <class T, ProtobufForm form>
+struct VarintForm : NumberForm<std::make_unsigned_t<T>, form, form> {
+  using Raw = std::make_unsigned_t<T>;
+  static constexpr uint64_t to_wire(Raw raw) {
+    return static_cast<uint64_t>(static_cast<int64_t>(static_cast<T>(raw)));
+  }
+  static constexpr Raw from_wire(uint64_t value) { return static_cast<Raw>(value); }
+};
+
+// The same with its sign in the lowest bit, so that small negative numbers are short.
+template <class Raw, ProtobufForm form>
+struct ZigzagForm : NumberForm<Raw, form, form> {
+  static constexpr uint64_t to_wire(Raw raw) { return raw << 1 ^ (0 - (raw >> (8 * sizeof(Raw) - 1))); }
+  static constexpr Raw from_wire(uint64_t value) {
+    const auto cut = static_cast<Raw>(value);
+    return cut >> 1 ^ (0 - (cut & 1));
+  }
+};
+
 // A count of 4 bytes and so many units, of which `terminator` stand in every string.
 template <ProtobufForm form, uint64_t unit_size, uint64_t terminator>
 struct StringForm {
   static constexpr bool kIsNumber = false, kIsString = true;
+  static constexpr bool kIsBytes = false;  // any bytes, and no text
   static constexpr ProtobufForm kSingle = form, kMany = form;
   static constexpr uint64_t kSize = 0, kMinimumSize = 4;  // in CDR
   static constexpr uint64_t kUnitSize = unit_size, kTerminator = terminator;
@@ -276,6 +314,26 @@ struct Form<CdrForm::Message> {
   static constexpr ProtobufForm kSingle = ProtobufForm::Message, kMany = ProtobufForm::Message;
   static constexpr uint64_t kLargestCharacter = 0;
   static constexpr const char* kValues = "";
+};
+
+// As Int32, Uint32, Int64 and Uint64 | int32, uint32, int64, uint64, sint32, sint64
+template <>
+struct Form<CdrForm::Varint32> : VarintForm<int32_t, ProtobufForm::Int32> {};
+template <>
+struct Form<CdrForm::Varuint32> : VarintForm<uint32_t, ProtobufForm::Uint32> {};
+template <>
+struct Form<CdrForm::Varint64> : VarintForm<int64_t, ProtobufForm::Int64> {};
+template <>
+struct Form<CdrForm::Varuint64> : VarintForm<uint64_t, ProtobufForm::Uint64> {};
+template <>
+struct Form<CdrForm::Zigzag32> : ZigzagForm<uint32_t, ProtobufForm::Sint32> {};
+template <>
+struct Form<CdrForm::Zigzag64> : ZigzagForm<uint64_t, ProtobufForm::Sint64> {};
+
+// As a sequence of Uint8, whose elements may be repeated here | bytes
+template <>
+struct Form<CdrForm::Bytes> : StringForm<ProtobufForm::Bytes, 1, 0> {
+  static constexpr bool kIsBytes = true;
 };
 
 // Calls `visitor` with the `Form` of a form. A form that has no `Form` does not compile.

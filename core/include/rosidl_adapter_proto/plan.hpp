@@ -27,6 +27,9 @@ constexpr uint32_t kMaximumDepth = 100;
 // (https://protobuf.dev/programming-guides/encoding/#size-limit).
 constexpr uint64_t kMaximumSize = 0x7fffffff;
 
+// https://protobuf.dev/programming-guides/proto3/#assigning
+constexpr uint32_t kMaximumFieldNumber = (1u << 29) - 1;
+
 // "No bound", for counts and for string lengths.
 constexpr uint32_t kUnbounded = 0xffffffff;
 

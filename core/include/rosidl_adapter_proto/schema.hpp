@@ -1,9 +1,12 @@
 // Schemas as recordings have them, read into plans without Python.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>
+
+#include "flat.hpp"
 
 namespace rosidl_proto {
 
@@ -19,5 +22,19 @@ constexpr size_t kMaximumSchemaSize = 4 * 1024 * 1024;
 // is wrong.
 const char* read_ros2msg(std::string_view text, std::string_view type_name,
                          std::vector<uint8_t>* packed_plan) noexcept;
+
+// A private field of google.protobuf.FieldOptions: SCALAR_OPTION in
+// rosidl_adapter_proto/transcode/protobuf_plan.py.
+constexpr uint32_t kScalarOption = 68725;
+
+// Reads a serialized FileDescriptorSet, which MCAP has as the schema of protobuf messages
+// (https://mcap.dev/spec/registry#protobuf), and makes the plan of one message, as `protobuf_plan` in
+// transcode/protobuf_plan.py does. `type_name` may begin with a dot. Returns nullptr, or what is wrong.
+const char* read_file_descriptor_set(const uint8_t* data, size_t size, std::string_view type_name,
+                                     std::vector<uint8_t>* packed_plan, FlatNotes* notes) noexcept;
+
+// Finds the size of a serialized FileDescriptorSet of which only is known that a NUL follows, where `room`
+// bytes may be read. Returns `room` if none follows.
+size_t file_descriptor_set_size(const uint8_t* data, size_t room) noexcept;
 
 }  // namespace rosidl_proto

@@ -1,0 +1,23 @@
+// What differs between the plugins: how the messages of an encoding, and the schemas of their types, are
+// read.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "rosidl_adapter_proto/flat.hpp"
+
+namespace rosidl_proto::plugin {
+
+// As PlotJuggler names it.
+extern const std::string_view kEncoding;
+extern const Serialization kSerialization;
+
+// The bytes of a schema of which a host only gives the beginning: `memory` is all that there is behind it.
+std::string_view schema_in(std::string_view memory) noexcept;
+
+// Returns nullptr, or what is wrong.
+const char* read_schema(std::string_view schema, std::string_view type_name,
+                        std::vector<uint8_t>* packed_plan, FlatNotes* notes) noexcept;
+
+}  // namespace rosidl_proto::plugin
