@@ -13,6 +13,7 @@ import numpy
 from rosidl_adapter_proto.errors import RequestError
 from rosidl_adapter_proto.plotjuggler.series import BagSeries, read_series
 from rosidl_adapter_proto.plotjuggler.series_model import Series
+from rosidl_adapter_proto.plotjuggler.series_names import SeriesNames
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -137,6 +138,10 @@ def plot_of(
         RequestError: A series of such a name is text, there are too many, or they have no values.
     """
     chosen, notes = _drawable(found.series, fields)
+    names = [SeriesNames([each]) for each in fields]
+    chosen.sort(
+        key=lambda series: [not each.is_chosen(series.name) for each in names]
+    )  # as they were asked for
     lines = []
     for each, colour in zip(chosen, COLOURS, strict=False):
         line, line_notes = _line(each, colour, start_time, spans)

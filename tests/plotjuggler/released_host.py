@@ -12,7 +12,9 @@ import wasmtime
 
 INPUT_SIZE = 128 * 1024
 OUTPUT_SIZE = 1024 * 1024
-Value = tuple[str, str, float | str]  # the key; `number` or `string`; the value, of which numbers become doubles
+Value = tuple[
+    str, str, float | str
+]  # the key; `number` or `string`; the value, of which numbers become doubles
 
 _NUMBERS = {
     **{0: "B", 1: "H", 2: "I", 3: "Q", 8: "b", 9: "h", 10: "i", 11: "q"},

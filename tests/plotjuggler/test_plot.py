@@ -41,6 +41,13 @@ def test_lines_have_names_colours_and_a_common_time() -> None:
     assert (drawn.title, drawn.notes, drawn.value_count) == ("recording", (), 2100)
 
 
+def test_lines_have_the_order_in_which_they_were_named() -> None:
+    found = [one("/a", f"/{key}", [1.0]) for key in ("x", "y[0]", "y[1]", "z/w")]
+    drawn = plot_of(BagSeries(tuple(found), ()), ["/a/z", "/a/y", "/a/?"], title="x", start_time=START)
+
+    assert [each.name for each in drawn.lines] == ["/a/z/w", "/a/y[0]", "/a/y[1]", "/a/x"]
+
+
 def test_every_line_has_a_colour_of_its_own() -> None:
     assert len(set(COLOURS)) == len(COLOURS) == MAXIMUM_LINES
 

@@ -51,14 +51,14 @@ def test_a_picture(run: Run, asked: dict[str, Any], folder: Path) -> None:
     chosen = ("--field", "/battery", "--start", "2023-11-14T22:13:20Z", "--end", str(START + 10**9))
     done = run("--output", "x.PNG", *chosen)
 
-    assert done == (0, "x.PNG: 3 series, 2100 values\n", "Warning: one message is odd\n")
+    assert done == (1, "x.PNG: 3 series, 2100 values\n", "Warning: one message is odd\n")
     assert asked == {"fields": (HEIGHT, "/battery"), "start": START, "end": START + 10**9, "progress": None}
-    assert matplotlib.image.imread(folder / "x.PNG").shape == (600, 1200, 4)
+    assert matplotlib.image.imread(folder / "x.PNG").shape[:2] == (600, 1200)
     assert sorted(path.name for path in folder.iterdir()) == ["bag.mcap", "x.PNG"]
 
 
 def test_a_page(run: Run, folder: Path) -> None:
-    assert run("-o", "x.html", "--title", "A <walk>")[:2] == (0, "x.html: 3 series, 2100 values\n")
+    assert run("-o", "x.html", "--title", "A <walk>")[:2] == (1, "x.html: 3 series, 2100 values\n")
     assert "<title>A &lt;walk&gt;</title>" in (folder / "x.html").read_text(encoding="utf-8")
 
 
@@ -67,7 +67,7 @@ def test_the_terminal(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     code, out, err = run()
 
     lines = out.splitlines()
-    assert (code, err) == (0, "Warning: one message is odd\n")
+    assert (code, err) == (1, "Warning: one message is odd\n")
     assert "\x1b" not in out
     assert lines[0].strip() == "bag.mcap"
     assert len(lines[1]) == 70
