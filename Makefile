@@ -52,7 +52,7 @@ test:
 	$(MAKE) --jobs=1 check docs test-core test-kilted test-jazzy test-colcon test-fuzz
 
 PYTHON_FOLDERS := rosidl_adapter_proto tests examples benchmarks core docs
-CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/src/*/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.?pp)
+CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/src/*/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.?pp core/wasm/*.?pp)
 
 # The hooks of .pre-commit-config.yaml are these.
 check: check-black check-clang-format check-ruff check-mypy

@@ -10,8 +10,9 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message import Message
 
+from rosidl_adapter_proto.interfaces.scalars import SCALARS
 from rosidl_adapter_proto.transcode.plan import PROTOBUF_TYPES, is_repeated
-from rosidl_adapter_proto.transcode.protobuf_plan import SCALAR_OPTION, is_map_entry
+from rosidl_adapter_proto.transcode.protobuf_plan import SCALAR_OPTION, is_map_entry, tell_scalar
 
 SCALAR_TYPES = [name for name in PROTOBUF_TYPES if name not in ("message", "group", "enum")]
 LIMITS = {
@@ -58,9 +59,9 @@ def add_field(message: descriptor_pb2.DescriptorProto, name: str, number: int, w
         field.type_name = type_name
 
 
-def tell_scalar(field: descriptor_pb2.FieldDescriptorProto, type_id: int) -> None:
-    """Say in the options of a field which ROS scalar it is."""
-    field.options.MergeFromString(varint(SCALAR_OPTION << 3 | 2) + bytes([1, type_id]))
+def set_option(field: descriptor_pb2.FieldDescriptorProto, content: bytes) -> None:
+    """Add the option that tells the ROS type of a field, whatever it says."""
+    field.options.MergeFromString(varint(SCALAR_OPTION << 3 | 2) + bytes([len(content)]) + content)
 
 
 def general_file() -> descriptor_pb2.FileDescriptorProto:
@@ -87,8 +88,8 @@ def general_file() -> descriptor_pb2.FileDescriptorProto:
         wide="bytes",
         letters="string",
     )
-    for field, type_id in zip(general.field[-3:], (2, 18, 13), strict=True):
-        tell_scalar(field, type_id)
+    for field, name in zip(general.field[-3:], ("int8", "wstring", "char"), strict=True):
+        tell_scalar(field, SCALARS[name])
     group = general.nested_type.add(name="Group")
     add_field(group, "inside", 1, ["int32"])
     add_field(general, "group", 100, ["group", ".test.General.Group"])

@@ -13,6 +13,10 @@ namespace rosidl_proto::plugin {
 extern const std::string_view kEncoding;
 extern const Serialization kSerialization;
 
+inline const uint8_t* bytes_of(std::string_view text) {
+  return reinterpret_cast<const uint8_t*>(text.data());
+}
+
 // The bytes of a schema of which a host only gives the beginning: `memory` is all that there is behind it.
 std::string_view schema_in(std::string_view memory) noexcept;
 

@@ -6,7 +6,7 @@ have other fields or numbers than those of another, or than generated code: each
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 
 from google.protobuf.descriptor import Descriptor, FileDescriptor
@@ -15,14 +15,25 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message import DecodeError
 
 from rosidl_adapter_proto.errors import BagError
+from rosidl_adapter_proto.interfaces.description import TypeDescription, described_type
+from rosidl_adapter_proto.interfaces.model import TypeName
+from rosidl_adapter_proto.interfaces.scalars import Scalar
 from rosidl_adapter_proto.schema.pools import MessageClass, kept_class
+from rosidl_adapter_proto.schema.typemap import proto_full_name
+from rosidl_adapter_proto.transcode.protobuf_plan import tell_scalar
 
 MAXIMUM_SIZE = 16 * 2**20
 """The largest descriptor set that is read, in bytes."""
 
 
-def descriptor_set(descriptor: Descriptor) -> bytes:
-    """Return the file of a message and all that it imports, what is imported first, as a serialized set."""
+def descriptor_set(descriptor: Descriptor, type_description: TypeDescription | None = None) -> bytes:
+    """Return the file of a message and all that it imports, what is imported first, as a serialized set.
+
+    Args:
+        descriptor: The message.
+        type_description: The ROS type of the message (REP-2011): what its protobuf fields do not tell of it, such as
+            that bytes are numbers from -128 to 127, is then in a private option of these fields.
+    """
     files: dict[str, FileDescriptorProto] = {}
     waiting: list[FileDescriptor] = [descriptor.file]
     while waiting:
@@ -30,7 +41,25 @@ def descriptor_set(descriptor: Descriptor) -> bytes:
         if file.name not in files:
             files[file.name] = FileDescriptorProto.FromString(file.serialized_pb)
             waiting.extend(file.dependencies)
+    if type_description is not None:
+        _tell_scalars(files, type_description)
     return FileDescriptorSet(file=_in_order(files)).SerializeToString(deterministic=True)
+
+
+def _tell_scalars(files: Mapping[str, FileDescriptorProto], type_description: TypeDescription) -> None:
+    types = (type_description["type_description"], *type_description["referenced_type_descriptions"])
+    fields = {
+        f"{proto_full_name(TypeName.parse(each['type_name']))}.{field['name']}": field["type"]
+        for each in types
+        for field in each["fields"]
+    }
+    for file in files.values():
+        for message in file.message_type:
+            for field in message.field:
+                ros_type = fields.get(f"{file.package}.{message.name}.{field.name}")
+                element = ros_type and described_type(ros_type)[1]
+                if isinstance(element, Scalar):
+                    tell_scalar(field, element)
 
 
 def recorded_class(data: bytes, full_name: str) -> MessageClass:

@@ -184,8 +184,10 @@ class BagTypes:
 
     def _with_recorded_class(self, schema: Schema, topic: Topic) -> Schema:
         """Return a schema whose class is that of the recording: the same one, if descriptors are the same."""
-        if topic.serialization_format != PROTOBUF or protobuf_definition(schema) == topic.definition:
+        if topic.serialization_format != PROTOBUF or topic.definition == protobuf_definition(schema):
             return schema
+        if topic.definition == RecordedDefinition(PROTOBUF, descriptor_set(schema.descriptor)):
+            return schema  # others, such as earlier versions of this, do not tell what is only of ROS
         if topic.definition.encoding != PROTOBUF:
             self.warnings.add(
                 f"{schema.type_name}: the recording has no protobuf descriptor; the one that `generate` makes is used"
@@ -245,7 +247,7 @@ def _of_its_version(topic: Topic, name: TypeName) -> Schema | None:
 
 def protobuf_definition(schema: Schema) -> RecordedDefinition:
     """Return the descriptor of a message as recordings have it: its file and all that it imports."""
-    return RecordedDefinition(PROTOBUF, descriptor_set(schema.descriptor))
+    return RecordedDefinition(PROTOBUF, descriptor_set(schema.descriptor, schema.type_description))
 
 
 def ros_definition(schema: Schema) -> RecordedDefinition:

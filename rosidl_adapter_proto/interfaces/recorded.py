@@ -143,7 +143,8 @@ def recorded_text(definitions: Mapping[TypeName, Definition]) -> tuple[str, byte
 def described_text(description: TypeDescription) -> bytes:
     """Return the text that `ros2msg` recordings have of a type, whatever it was defined in: fields, and nothing else.
 
-    The `char` and `wchar` of IDL, which `.msg` does not have, are the numbers that they are in CDR.
+    The `char` and `wchar` of IDL, which `.msg` does not have, are the numbers that they are in CDR, and parts of
+    services and actions in other messages are messages of the same names.
 
     Args:
         description: The type and all that it refers to.
@@ -151,12 +152,21 @@ def described_text(description: TypeDescription) -> bytes:
     Raises:
         DefinitionError: It has a `long double`, which no `.msg` can say.
     """
-    top, others = description["type_description"], description["referenced_type_descriptions"]
+    top = description["type_description"]
+    name = top["type_name"]
     texts = [_described_fields(top)]
-    for each in others:
-        name = _written(TypeName.parse(each["type_name"]), ROS2MSG)
-        texts.append(f"{'=' * 80}\nMSG: {name}\n{_described_fields(each)}")
+    if (
+        not texts[0] and TypeName.parse(name).namespace != "msg"
+    ):  # else nothing would be taken for no definition
+        texts.insert(0, f"{'=' * 80}\nMSG: {name}\n")
+    for each in description["referenced_type_descriptions"]:
+        texts.append(f"{'=' * 80}\nMSG: {_described_name(each['type_name'])}\n{_described_fields(each)}")
     return "".join(texts).encode()
+
+
+def _described_name(name: str) -> str:
+    package, _, last = name.split("/")
+    return f"{package}/{last}"
 
 
 _NUMBERS_OF_CHARACTERS = {"char": "uint8", "wchar": "uint16"}
@@ -171,7 +181,7 @@ def _described_fields(description: IndividualTypeDescription) -> str:
 def _described_field_type(type_name: str, field: FieldDescription) -> str:
     shape, element, capacity, string_bound = described_type(field["type"])
     if isinstance(element, TypeName):
-        text = _written(element, ROS2MSG)
+        text = _described_name(str(element))
     elif element.msg:
         text = element.msg[0]
     elif element.name in _NUMBERS_OF_CHARACTERS:

@@ -32,7 +32,10 @@ class Recipe:
     description: str
 
 
-RECIPES = (Recipe("ros2msg", "Series of ROS 2 messages in CDR, by the text that defines them"),)
+RECIPES = (
+    Recipe("protobuf", "Series of protobuf messages, by the FileDescriptorSet of their type"),
+    Recipe("ros2msg", "Series of ROS 2 messages in CDR, by the text that defines their type"),
+)
 
 # Relative to the folder of the core, where the compiler runs: so no path of this machine comes into a plugin.
 _SOURCES = (

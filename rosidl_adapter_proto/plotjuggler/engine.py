@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MAXIMUM_FILE_SIZE = 64 << 20
 PAGE = 1 << 16
 _MAGIC = b"\0asm"
-_WASI = ("wasi_snapshot_preview1", "wasi_unstable")
+_WASI = ("wasi_snapshot_preview1.", "wasi_unstable.")
 _INITIALIZERS = ("_initialize", "__wasm_call_ctors")  # the first that there is is called, as PlotJuggler does
 
 
@@ -83,7 +83,7 @@ def read_program(plugin: str | Path | bytes) -> Program:
     name = "plugin" if isinstance(plugin, bytes) else Path(plugin).name
     data = plugin if isinstance(plugin, bytes) else _file_bytes(Path(plugin))
     if len(data) > MAXIMUM_FILE_SIZE:
-        raise PluginError(f"{name}: {len(data)} bytes; a plugin has at most {MAXIMUM_FILE_SIZE}")
+        raise PluginError(f"{name}: more than {MAXIMUM_FILE_SIZE} bytes, which no plugin has")
     if not data.startswith(_MAGIC):  # wasmtime would take a text for one
         raise PluginError(f"{name}: not a WebAssembly file")
     try:
@@ -103,6 +103,11 @@ def read_program(plugin: str | Path | bytes) -> Program:
             maximum = kind.limits.max * PAGE
     imports = tuple(f"{each.module}.{each.name}" for each in module.imports)
     return Program(name, data, module, functions, tuple(others), imports, maximum)
+
+
+def is_wasi(name: str) -> bool:
+    """Tell whether an import, as `module.name`, is of WASI: such functions are there, and do nothing."""
+    return name.startswith(_WASI)
 
 
 def _file_bytes(path: Path) -> bytes:
@@ -172,9 +177,7 @@ class Instance:
         """
         import wasmtime
 
-        unknown = [
-            name for name in program.imports if not name.startswith(tuple(f"{each}." for each in _WASI))
-        ]
+        unknown = [name for name in program.imports if not is_wasi(name)]
         if unknown:
             raise PluginError(
                 f"{program.name}: imports {', '.join(unknown)}, which a plugin does not get; build it without imports"

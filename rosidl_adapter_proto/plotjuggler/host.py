@@ -10,11 +10,11 @@ with plugin.parser("/imu", "sensor_msgs/msg/Imu", schema) as parser:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy
 
@@ -53,6 +53,7 @@ __all__ = [
 
 
 MAXIMUM_STRIKES = 3
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +144,8 @@ class Plugin:
             PluginError: The plugin does not make one.
             RequestError: The topic or the type has a NUL byte.
         """
+        if "\0" in topic + type_name:
+            raise RequestError("a topic and a type have no NUL byte")
         return Parser(self, ParserRequest(topic, type_name, schema, array_policy), embedded_time)
 
     @property
@@ -161,16 +164,19 @@ class Plugin:
                 f"{self.name}: broke its contract {MAXIMUM_STRIKES} times, and is not run again"
             )
         if self._session is None:
-            try:
-                self._session = self._start()
-            except Trap as trap:
-                raise PluginError(f"{self.name}: stopped while it began: {trap.reason}") from None
+            self._session = self._begun(self._start)
         return self._session
 
     def _start(self) -> Session:
         if isinstance(self.manifest, ModuleManifest):
             return ModuleSession(self._program, self._dialect, self._limits, self.manifest)
         return FunctionsSession(self._program, self._dialect, self._limits)
+
+    def _begun(self, start: Callable[[], _T]) -> _T:
+        try:
+            return start()
+        except Trap as trap:
+            raise PluginError(f"{self.name}: it was stopped while it began: {trap.reason}") from None
 
     def strike(self) -> None:
         """Count a time that the plugin was stopped or broke its contract: modules are not run after the third."""
@@ -184,10 +190,11 @@ class Plugin:
     def _read_manifest(self) -> Manifest | ModuleManifest:
         if self._dialect.name == "module":
             return read_module_manifest(self._program.data)
+        instance = self._begun(lambda: Instance(self._program, self._limits, None))
         try:
-            text = manifest_text(Instance(self._program, self._limits, None))
+            text = manifest_text(instance)
         except Trap as trap:
-            raise PluginError(f"{self.name}: stopped in pj_plugin_manifest: {trap.reason}") from None
+            raise PluginError(f"{self.name}: it was stopped in pj_plugin_manifest: {trap.reason}") from None
         try:
             return read_manifest(text)
         except PluginError:
@@ -253,7 +260,10 @@ class Parser:
         view = memoryview(data).cast("B")
         times = None if time is None else numpy.array([time], "i8")
         messages = Messages(view, numpy.zeros(1, "i8"), numpy.array([len(view)], "i8"), times)
-        outputs = next(self._outputs(messages))
+        try:
+            outputs = next(self._outputs(messages))
+        except BrokenContract as broken:
+            raise self._broken(broken.index, broken.reason) from None
         begin, size = int(outputs.begins[0]), int(outputs.sizes[0])
         if size <= 0:
             return Parsed((), time, outputs.refused[0])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,7 @@ ENCODINGS = (
 )
 ROUTES = ("scalar", "object")
 ANY_TYPE = "*"
+_CUSTOM, _START = 0, 8  # numbers of sections
 _PRIORITIES = range(-1000, 1001)
 _NUMBER = r"(?:0|[1-9]\d*)"
 _IDENTIFIER = rf"(?:{_NUMBER}|\d*[A-Za-z-][0-9A-Za-z-]*)"
@@ -102,31 +104,41 @@ def read_module_manifest(data: bytes) -> ModuleManifest:
     Raises:
         PluginError: There is not exactly one, or it breaks a rule; the text says which member.
     """
-    found = sections(data, SECTION)
+    found = _custom_sections(data, SECTION)
     if len(found) != 1:
         raise PluginError(f"{SECTION}: there are {len(found)} such custom sections instead of one")
     return parse_module_manifest(found[0])
 
 
-def sections(data: bytes, name: str) -> list[bytes]:
-    """Return the content of the custom sections of a WebAssembly file that have a name.
+def has_start_section(data: bytes) -> bool:
+    """Tell whether a WebAssembly file runs something by itself once it is loaded.
 
     Raises:
         PluginError: A section ends behind the file.
     """
+    return any(number == _START for number, _, _ in _sections(data))
+
+
+def _custom_sections(data: bytes, name: str) -> list[bytes]:
+    """Return the content of the custom sections that have a name."""
     found = []
+    for number, begin, end in _sections(data):
+        if number == _CUSTOM:
+            length, text = _varuint32(data, begin)
+            if text + length <= end and data[text : text + length] == name.encode():
+                found.append(data[text + length : end])
+    return found
+
+
+def _sections(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Return the number of each section of a WebAssembly file, and where its content begins and ends."""
     at = 8
     while at < len(data):
-        number = data[at]
         size, begin = _varuint32(data, at + 1)
-        at = begin + size
-        if at > len(data):
+        if size > len(data) - begin:
             raise PluginError(f"byte {begin}: a section has {size} bytes, but {len(data) - begin} are left")
-        if number == 0:
-            length, text = _varuint32(data, begin)
-            if text + length <= at and data[text : text + length] == name.encode():
-                found.append(data[text + length : at])
-    return found
+        yield data[at], begin, begin + size
+        at = begin + size
 
 
 def _varuint32(data: bytes, at: int) -> tuple[int, int]:
@@ -148,7 +160,7 @@ def parse_module_manifest(text: bytes) -> ModuleManifest:
     if len(text) > MAXIMUM_SIZE:
         raise PluginError(f"{SECTION}: {len(text)} bytes; at most {MAXIMUM_SIZE} are read")
     try:
-        document = json.loads(text.decode())
+        document = json.loads(text.decode(), parse_constant=_refuse_constant)
     except UnicodeDecodeError as error:
         raise PluginError(f"{SECTION}: byte {error.start} is not UTF-8") from None
     except json.JSONDecodeError as error:
@@ -170,6 +182,10 @@ def parse_module_manifest(text: bytes) -> ModuleManifest:
             raise claim_members.error("claim_id", f"a second {claim.claim_id!r}")
         claims[claim.claim_id] = claim
     return ModuleManifest(identifier, name, version, tuple(claims.values()))
+
+
+def _refuse_constant(name: str) -> None:
+    raise json.JSONDecodeError(f"there is no {name}", "", 0)
 
 
 def _claim(members: _Members) -> Claim:

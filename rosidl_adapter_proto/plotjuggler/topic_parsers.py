@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy
 
-from rosidl_adapter_proto.bags.descriptors import descriptor_set
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition
 from rosidl_adapter_proto.errors import BagError, DefinitionError, PluginError, RequestError
 from rosidl_adapter_proto.interfaces.recorded import ORIGIN, ROS2MSG, described_text
 from rosidl_adapter_proto.plotjuggler.columns import Column
 from rosidl_adapter_proto.plotjuggler.host import ArrayPolicy, Parser, Plugin, open_plugin
+from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
 from rosidl_adapter_proto.transcode.codec import Transcoder
 from rosidl_adapter_proto.transcode.error import TranscodeError
 
@@ -55,8 +55,8 @@ def parser_input(topic: Topic, types: BagTypes) -> ParserInput:
 def _of_protobuf(topic: Topic, types: BagTypes) -> ParserInput:
     if topic.definition.encoding == PROTOBUF and topic.definition.data:
         return ParserInput(PROTOBUF, topic.schema_name, topic.definition.data)
-    descriptor = types.message_class(topic).DESCRIPTOR
-    return ParserInput(PROTOBUF, descriptor.full_name, descriptor_set(descriptor))  # type: ignore[arg-type]
+    schema = types.schema(topic)
+    return ParserInput(PROTOBUF, schema.descriptor.full_name, protobuf_definition(schema).data)
 
 
 def _of_cdr(topic: Topic, types: BagTypes) -> ParserInput:
@@ -168,10 +168,6 @@ class TopicParsers:
                 "`plotjuggler run`"
             )
         if encoding not in self._ours:
-            from rosidl_adapter_proto.plotjuggler.plugins import (  # type: ignore[import-not-found, unused-ignore]
-                plugin_path,
-            )
-
             self._ours[encoding] = open_plugin(plugin_path(encoding))
         return self._ours[encoding]
 

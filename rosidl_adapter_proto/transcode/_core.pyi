@@ -55,6 +55,9 @@ def pack_records(
 def index_records(data: Buffer, /) -> tuple[bytes, dict[int, int], dict[int, int], int, int]:
     """Return what `records.RecordIndex` has."""
 
+KEPT_FAILURES: int
+"""Of how many messages of a chunk that fail it is told which they are."""
+
 def read_ros2msg(text: bytes, type_name: str) -> bytes:
     """Return the packed plan of a type with hashed field numbers, as `Plan.pack` does, without Python.
 
@@ -79,9 +82,6 @@ def read_file_descriptor_set(data: bytes, type_name: str) -> tuple[bytes, list[_
     Raises:
         ValueError: The set is damaged or too large, or does not have the message.
     """
-
-KEPT_FAILURES: int
-"""Of how many messages of a chunk that fail it is told which they are."""
 
 class Memory(Buffer):
     """Memory of the native module, as a buffer that cannot be written to."""

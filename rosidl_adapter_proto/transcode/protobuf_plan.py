@@ -11,6 +11,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto
 
 from rosidl_adapter_proto.errors import SchemaError
 from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, Shape
@@ -43,6 +44,9 @@ SCALAR_OPTION = 68_725
 Recordings have it where a protobuf type does not tell the ROS type. Numbers from 50000 to 99999 are for such use
 (https://protobuf.dev/programming-guides/proto2/#customoptions).
 """
+
+_SCALAR_TAG = bytes.fromhex("aa c7 21")
+"""What stands before it in a serialized message: its number and the wire type of bytes."""
 
 NATURAL_FORMS: dict[str, tuple[str, CdrForm]] = {
     "double": ("double", CdrForm.DOUBLE),
@@ -101,10 +105,11 @@ def protobuf_plan(descriptor: Descriptor) -> tuple[Plan, list[FlatNote]]:
     return plan, notes if any(note != NO_NOTE for note in notes) else []
 
 
-def natural_scalar(field: FieldDescriptor) -> Scalar | None:
-    """Return what an element of a field is by nature; None for a message or a group."""
-    scalar, _ = _NATURAL.get(field.type, (None, None))
-    return scalar
+def tell_scalar(field: FieldDescriptorProto, scalar: Scalar) -> None:
+    """Say in the options of a field which ROS type it is, if its protobuf type does not tell."""
+    natural, _ = _NATURAL[field.type]
+    if scalar is not natural and scalar.cdr is not None:
+        field.options.MergeFromString(_SCALAR_TAG + bytes([1, scalar.type_id]))
 
 
 class _Builder:

@@ -468,7 +468,7 @@ def test_every_embedded_message_is_written_of_its_description() -> None:
         (BasicType("octet"), "byte"),
         (SequenceType(BasicType("char")), "uint8[]"),
         (BasicType("wchar"), "uint16"),
-        (TypeName("test_msgs", "srv", "Empty_Request"), "test_msgs/srv/Empty_Request"),
+        (TypeName("test_msgs", "srv", "Empty_Request"), "test_msgs/Empty_Request"),
     ],
 )
 def test_types_of_described_fields(field_type: FieldType, text: str) -> None:
@@ -476,6 +476,13 @@ def test_types_of_described_fields(field_type: FieldType, text: str) -> None:
     description = individual_description(Message(name, (Field("a", field_type), Field("b", field_type))))
     whole = described_text({"type_description": description, "referenced_type_descriptions": []})
     assert whole.decode() == f"{text} a\n{text} b\n"
+
+
+def test_the_description_of_a_request_without_fields_has_a_name() -> None:
+    name = TypeName("std_srvs", "srv", "Trigger_Request")
+    fields = (Field("structure_needs_at_least_one_member", BasicType("uint8")),)
+    text = described_text(describe(name, {name: Message(name, fields)}.__getitem__))
+    assert text.decode() == f"{RULE}\nMSG: std_srvs/srv/Trigger_Request\n"
 
 
 def test_a_described_long_double_is_no_msg() -> None:

@@ -24,10 +24,12 @@ MALLOC = """
   (func (export "malloc") (param $size i32) (result i32)
     (local $address i32)
     (local.set $address (global.get $heap))
-    (global.set $heap (i32.and (i32.add (i32.add (global.get $heap) (local.get $size)) (i32.const 15)) (i32.const -16)))
-    (if (i32.gt_u (global.get $heap) (i32.shl (memory.size) (i32.const 16)))
-      (then (if (i32.eq (i32.const -1) (memory.grow
-          (i32.add (i32.shr_u (local.get $size) (i32.const 16)) (i32.const 2)))) (then (return (i32.const 0))))))
+    (local.set $size (i32.and (i32.add (local.get $size) (i32.const 15)) (i32.const -16)))
+    (if (i32.gt_u (i32.add (local.get $address) (local.get $size)) (i32.shl (memory.size) (i32.const 16)))
+      (then (if (i32.eq (i32.const -1)
+          (memory.grow (i32.add (i32.shr_u (local.get $size) (i32.const 16)) (i32.const 1))))
+        (then (return (i32.const 0))))))
+    (global.set $heap (i32.add (local.get $address) (local.get $size)))
     (local.get $address))
 """
 """Gives memory, and never takes it back."""

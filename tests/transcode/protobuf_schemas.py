@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from google.protobuf import descriptor_pb2
 from hypothesis import strategies as st
-from protobuf_types import SCALAR_TYPES, add_message, tell_scalar
+from protobuf_types import SCALAR_TYPES, add_message, set_option
 
 KEYS = [name for name in SCALAR_TYPES if name not in ("double", "float", "bytes")]
 TYPE_IDS = range(1, 24)
@@ -35,5 +35,5 @@ def files(draw: st.DrawFn) -> descriptor_pb2.FileDescriptorProto:
         message = add_message(file, f"M{index}", **{f"f{i}": text for i, text in enumerate(fields)})
         for field in message.field:
             if draw(st.integers(0, 5)) == 0:
-                tell_scalar(field, draw(st.sampled_from(TYPE_IDS)))
+                set_option(field, bytes([draw(st.sampled_from(TYPE_IDS))]))
     return file

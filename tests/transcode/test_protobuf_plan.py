@@ -17,7 +17,7 @@ from protobuf_types import (
     descriptor_of,
     fill,
     general_file,
-    tell_scalar,
+    set_option,
 )
 from reference_cdr import write_cdr
 from ros_types import struct_type
@@ -234,15 +234,15 @@ def test_types_that_contain_each_other_are_planned_once_for_each_way_down() -> N
 def test_an_option_tells_the_ros_type(text: str, type_id: int, expected: tuple[CdrForm, int, Shape]) -> None:
     file = descriptor_pb2.FileDescriptorProto(name="a.proto", package="test", syntax="proto3")
     message = add_message(file, "Type", value=text)
-    tell_scalar(message.field[0], type_id)
+    set_option(message.field[0], bytes([type_id]))
     assert operations(descriptor_of([file], "test.Type")) == {"value": expected}
 
 
 def test_an_option_that_is_there_twice() -> None:
     file = descriptor_pb2.FileDescriptorProto(name="a.proto", package="test", syntax="proto3")
     message = add_message(file, "Type", value="int32")
-    tell_scalar(message.field[0], 2)
-    tell_scalar(message.field[0], 3)
+    set_option(message.field[0], b"\2")
+    set_option(message.field[0], b"\3")
     with pytest.raises(
         SchemaError, match=r"^test.Type.value: its option 68725 is there more than once; keep one$"
     ):
