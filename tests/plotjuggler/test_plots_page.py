@@ -16,12 +16,16 @@ PICTURE = ROOT / "docs" / "images" / "plot.png"
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(plugin_files: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which everything on the page has run."""
-    folder = tmp_path_factory.mktemp("plots")
+    folder, cache = tmp_path_factory.mktemp("plots"), tmp_path_factory.mktemp("cache")
+    (cache / "rosidl_adapter_proto").mkdir()
+    (cache / "rosidl_adapter_proto" / "plotjuggler").symlink_to(plugin_files["ros2msg"].parent.parent)
     write_walk(folder)
-    for kind, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
-        run(folder, folder, kind, text)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(cache))
+        for kind, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+            run(folder, folder, kind, text)
     return folder
 
 
