@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from rosidl_adapter_proto.cli.options import bag_source_options, time_options
-from rosidl_adapter_proto.cli.series_options import EXIT_INCOMPLETE, require_plotjuggler
-from rosidl_adapter_proto.cli.texts import progress_bar, show_warnings
+from rosidl_adapter_proto.cli.series_options import require_plotjuggler
+from rosidl_adapter_proto.cli.texts import EXIT_INCOMPLETE, progress_bar, show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 _HEIGHT = 20  # lines; plotext draws no more than it takes a terminal to have
