@@ -93,7 +93,7 @@ def rows(folder: Path, stream: Stream, count: int) -> None:
 def bag_rows(folder: Path) -> None:
     """Measure the series of a whole bag, and print its row."""
     path = folder / "bag.mcap"
-    streams, length = (IMU, JOINT_STATES, TF), 100
+    streams, length = (IMU, JOINT_STATES, TF), 300
     messages = list(record(streams, length))
     write_mcap(path, messages, compression="zstd")
     bag = open_bag(path)

@@ -55,8 +55,9 @@ def flatten_protobuf(message: Message, prefix: str = "") -> Iterator[FlatPair]:
         )
         if entry:
             for name in value:
+                shown = str(name).lower() if isinstance(name, bool) else name
                 yield from _flatten_protobuf_value(
-                    value[name], entry.fields_by_name["value"], f"{key}/{name}"
+                    value[name], entry.fields_by_name["value"], f"{key}/{shown}"
                 )
         elif _is_repeated(field):
             if len(value) <= LONGEST_ARRAY:
@@ -81,6 +82,8 @@ _PROTOBUF_TYPES = {
 def _flatten_protobuf_value(value: Any, field: Any, key: str) -> Iterator[FlatPair]:
     if field.cpp_type == FieldDescriptor.CPPTYPE_MESSAGE:
         yield from flatten_protobuf(value, key)
+    elif field.type == FieldDescriptor.TYPE_ENUM and value in field.enum_type.values_by_number:
+        yield key, "string", field.enum_type.values_by_number[value].name
     elif field.type == FieldDescriptor.TYPE_STRING:
         yield key, "string", value
     elif field.type == FieldDescriptor.TYPE_BYTES:
