@@ -126,6 +126,7 @@ benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/messages.py
 	$(BIN)/python benchmarks/bags.py
 	$(BIN)/python benchmarks/tables.py
+	$(BIN)/python benchmarks/plotjuggler.py
 
 golden: $(VENV)/ready
 	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py \

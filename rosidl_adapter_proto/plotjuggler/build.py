@@ -39,7 +39,13 @@ RECIPES = (
 
 # Relative to the folder of the core, where the compiler runs: so no path of this machine comes into a plugin.
 _SOURCES = (
-    *("wasm/system.cpp", "wasm/memory.cpp", "wasm/plotjuggler3.cpp", "wasm/plotjuggler4.cpp", "wasm/plugin.cpp"),
+    *(
+        "wasm/system.cpp",
+        "wasm/memory.cpp",
+        "wasm/plotjuggler3.cpp",
+        "wasm/plotjuggler4.cpp",
+        "wasm/plugin.cpp",
+    ),
     *("src/error.cpp", "src/flat.cpp", "src/plan.cpp", "src/proto_to_cdr.cpp", "src/text.cpp"),
 )
 # Only what every host has: WebAssembly 1.0, and copying of memory. 256 MiB is what PlotJuggler 4 allows.
