@@ -10,7 +10,7 @@ FUZZ_MUTATIONS ?= 200000
 FUZZ_SECONDS ?= 600
 
 .PHONY: demo environments test check check-black check-clang-format check-ruff check-mypy docs tidy \
-  test-core test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
+  test-core test-kilted test-jazzy test-colcon test-fuzz fuzz plugins benchmark golden format clean
 
 # What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
 KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
@@ -115,6 +115,11 @@ fuzz: $(VENV)/ready
 	$(BIN)/python core/fuzz/make_corpus.py build/fuzz-clang/corpus
 	ROSIDL_PROTO_FUZZ_PLANS=build/fuzz-clang/corpus/plans.bin \
 	  build/fuzz-clang/core/fuzz/fuzz_transcode -max_total_time=$(FUZZ_SECONDS) build/fuzz-clang/corpus/inputs
+
+# The parser plugins of PlotJuggler, which wheels that are built afterwards bring.
+plugins: $(VENV)/ready
+	rm -rf rosidl_adapter_proto/plotjuggler/built
+	$(BIN)/python -c "from rosidl_adapter_proto.plotjuggler.plugins import build_shipped_plugins as build; build()"
 
 benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/generate.py

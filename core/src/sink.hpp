@@ -9,7 +9,8 @@
 //                 `within_limit`, as `CdrSize` does
 //   kPlaces       the fields of a message of fixed size can be written in any order; then it has `zeros` and
 //                 `position`, as `CdrWriter` does
-//   kAllFields    it wants zeros for fields that protobuf does not have
+//   kMakesCdr     it makes CDR: it wants zeros for fields that protobuf does not have, and no string with NUL
+//                 inside
 //
 // and what a reader calls, each of which returns where it goes on:
 //

@@ -466,6 +466,17 @@ TEST(text_of_the_page_is_cut_at_a_character) {
   }
 }
 
+TEST(text_may_have_nul_inside_where_no_cdr_is_made) {
+  const Plan plan = plan_of(CdrForm::String);
+  const Bytes proto = {0x0a, 3, 'a', 0, 'b'};
+  Flattener made = flattener(plan, FlatFormat::Released);
+  const Bytes pairs = flatten(made, Serialization::Protobuf, proto);
+  CHECK(pairs.size() > 3 && Bytes(pairs.end() - 3, pairs.end()) == (Bytes{'a', 0, 'b'}));
+  std::string error;
+  to_cdr(plan, proto, &error);
+  CHECK(error.find("the string contains NUL, which ends a string in ROS; remove it") != std::string::npos);
+}
+
 TEST(messages_that_are_not_valid_have_no_pairs) {
   for (const FlatFormat format : kFormats) {
     Flattener made = flattener(golden_plan("every_form"), format);
