@@ -38,9 +38,7 @@ class ReleasedHost:
         self.store = wasmtime.Store(engine)
         if memory_limit is not None:
             self.store.set_limits(memory_size=memory_limit)
-        linker = wasmtime.Linker(engine)
-        linker.define_wasi()
-        instance = linker.instantiate(self.store, module)
+        instance = wasmtime.Instance(self.store, module, [])  # no imports
         self.exports = instance.exports(self.store)
         memory = self.exports["memory"]
         assert isinstance(memory, wasmtime.Memory)

@@ -12,6 +12,7 @@ import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from protobuf_types import add_message, varint
 
+from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
 from tests.plotjuggler.released_host import OUTPUT_SIZE, ReleasedHost, ReleasedParser, Value, read_pairs
 from tests.plotjuggler.topics import ENCODINGS, Topic, topics
 
@@ -114,6 +115,15 @@ def test_node_gives_the_same(plugin: Path, host: ReleasedHost, encoding: str) ->
             parser.destroy()
         assert json.loads(done.stdout) == expected
         assert all(output for outputs in expected for output in outputs)
+
+
+def test_both_plugins_show_the_same_values() -> None:
+    hosts = {encoding: ReleasedHost(plugin_path(encoding)) for encoding in ENCODINGS}
+    for recorded in zip(*(topics(encoding) for encoding in ENCODINGS), strict=True):
+        parsers = [parser_of(host, topic) for host, topic in zip(hosts.values(), recorded, strict=True)]
+        for messages in zip(*(topic.messages for topic in recorded), strict=True):
+            protobuf, cdr = (parser.parse(each) for parser, each in zip(parsers, messages, strict=True))
+            assert repr(protobuf) == repr(cdr)
 
 
 @pytest.mark.parametrize(
