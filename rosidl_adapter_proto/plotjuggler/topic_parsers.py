@@ -11,6 +11,7 @@ import numpy
 from rosidl_adapter_proto.bags.model import CDR, PROTOBUF, ROS1, Topic
 from rosidl_adapter_proto.bags.types import BagTypes, protobuf_definition
 from rosidl_adapter_proto.errors import BagError, DefinitionError, PluginError, RequestError
+from rosidl_adapter_proto.interfaces.model import TypeName
 from rosidl_adapter_proto.interfaces.recorded import ORIGIN, ROS2MSG, described_text
 from rosidl_adapter_proto.plotjuggler.columns import Column
 from rosidl_adapter_proto.plotjuggler.host import ArrayPolicy, Parser, Plugin, open_plugin
@@ -60,11 +61,11 @@ def _of_protobuf(topic: Topic, types: BagTypes) -> ParserInput:
 
 
 def _of_cdr(topic: Topic, types: BagTypes) -> ParserInput:
-    recorded = types.ros_definition(topic)
-    is_complete = recorded.encoding == ROS2MSG and types.origin(topic) == ORIGIN
-    if is_complete and "/srv/" not in topic.type_name and "/action/" not in topic.type_name:
-        return ParserInput(ROS2MSG, topic.type_name, recorded.data)
     schema = types.schema(topic)
+    recorded = types.ros_definition(topic)
+    is_whole = recorded.encoding == ROS2MSG and types.origin(topic) == ORIGIN
+    if is_whole and TypeName.parse(schema.type_name).namespace == "msg":
+        return ParserInput(ROS2MSG, topic.type_name, recorded.data)
     try:
         return ParserInput(ROS2MSG, schema.type_name, described_text(schema.type_description))
     except DefinitionError as error:

@@ -287,3 +287,25 @@ def test_ros1_bags(tmp_path: Path) -> None:
     }
     (warning,) = found.warnings
     assert warning.startswith("1 of 3 messages of /point could not be parsed and are left out; the first: ")
+
+
+def test_bags_without_definitions(tmp_path: Path) -> None:
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("geometry_msgs/msg/Point32", "", b"")
+        channel = writer.register_channel("/point", "cdr", schema)
+        writer.add_message(channel, 5, b"\0\1\0\0" + struct.pack("<fff", 1, 2, 3), 5)
+        writer.finish()  # type: ignore[no-untyped-call]
+    found = read_series(open_bag(path))
+    assert values_of(found) == {"/point/x": ([5], [1]), "/point/y": ([5], [2]), "/point/z": ([5], [3])}
+    assert found.warnings == ()
+
+
+def test_a_type_of_which_nothing_is_known(tmp_path: Path) -> None:
+    path = echo_bag(tmp_path / "bag.mcap", ("/x", [(1, b"")]), encoding="cdr")
+    found = read_series(open_bag(path))
+    assert found.series == ()
+    (warning,) = found.warnings
+    assert warning.startswith("topic /x (Echo): ") and warning.endswith("; 0 of 1 messages of /x were read")
