@@ -10,6 +10,9 @@
 //   kPlaces       the fields of a message of fixed size can be written in any order; then it has `zeros` and
 //                 `position`, as `CdrWriter` does
 //   kAllFields    it wants zeros for fields that protobuf does not have
+//   kAnyText      it takes strings that are no UTF-8 or have a NUL inside, which else are errors; only sinks
+//   that
+//                 do say so
 //
 // and what a reader calls, each of which returns where it goes on:
 //
@@ -45,6 +48,8 @@ struct Text {
 
 // Why a sink stopped, and the number in the text of the reason.
 struct Stop {
+  static constexpr bool kAnyText = false;
+
   Reason reason = Reason::None;
   uint64_t detail = 0;
 };

@@ -466,6 +466,26 @@ TEST(text_of_the_page_is_cut_at_a_character) {
   }
 }
 
+// "a", a NUL, a byte that begins no character, a surrogate as UTF-8 (two of its three bytes are none), "z".
+TEST(any_bytes_are_text) {
+  const std::string shown = std::string("a\0", 2) + "\xef\xbf\xbd" + "\xef\xbf\xbd" + "\xef\xbf\xbd" + "z";
+  const Bytes text = {'a', 0, 0xff, 0xed, 0xa0, 'z'};
+  Bytes cdr = {7, 0, 0, 0};
+  Bytes proto = {0x0a, 6};
+  for (Bytes* const each : {&cdr, &proto}) each->insert(each->end(), text.begin(), text.end());
+  cdr.push_back(0);
+  for (const FlatFormat format : kFormats) {
+    Flattener made = flattener(plan_of(CdrForm::String), format);
+    const Bytes found = flatten(made, Serialization::Protobuf, proto);
+    CHECK(lines(format, found).find(shown + "\n") != std::string::npos);
+    CHECK(flatten(made, Serialization::Cdr, cdr_of(cdr)) == found);
+  }
+  // counts = {"x", a NUL, a byte that is none, "y"}
+  CHECK_EQUAL(general({0xa2, 2, 6, 0x0a, 4, 'x', 0, 0x80, 'y'}),
+              "/color STRING RED\n/tree/name STRING \n" + std::string("/counts/x\0", 10) +
+                  "\xef\xbf\xbdy INT64 0\n/small INT8 0\n/wide STRING \n");
+}
+
 TEST(messages_that_are_not_valid_have_no_pairs) {
   for (const FlatFormat format : kFormats) {
     Flattener made = flattener(golden_plan("every_form"), format);
