@@ -6,6 +6,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 PACKAGE = Path(__file__).parent.parent / "rosidl_adapter_proto"
 
 # A part of the package imports only parts with a lower number, and itself; `errors` is for all.
@@ -59,12 +61,13 @@ def test_imports_go_one_way() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_the_architecture_says_what_each_file_of_bags_does() -> None:
+@pytest.mark.parametrize("folder", ["bags", "plotjuggler"])
+def test_the_architecture_says_what_each_file_does(folder: str) -> None:
     text = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
-    table = text.partition("## The files of `bags/`\n")[2].partition("\n## ")[0]
+    table = text.partition(f"## The files of `{folder}/`\n")[2].partition("\n## ")[0]
     missing = [
         file.name
-        for file in sorted((PACKAGE / "bags").glob("*.py"))
+        for file in sorted((PACKAGE / folder).glob("*.py"))
         if file.stem not in ENTRANCES and f"`{file.name}`" not in table
     ]
     assert not missing

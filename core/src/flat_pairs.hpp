@@ -146,6 +146,47 @@ uint32_t next_character(const Units& units, uint64_t* index) {
   return join_surrogates(unit, units[(*index)++]);
 }
 
+// What should be UTF-8, read as such.
+class Utf8Units {
+ public:
+  explicit Utf8Units(const Text& text) : text_(text) {}
+
+  uint64_t count() const { return text_.size; }
+  const uint8_t* place(uint64_t index) const { return text_.data + index; }
+
+ private:
+  Text text_;
+};
+
+// Takes a character off it; a byte that is part of none is U+FFFD.
+inline uint32_t next_character(const Utf8Units& units, uint64_t* index) {
+  uint32_t code_point;
+  const uint8_t* const begin = units.place(*index);
+  const uint8_t* const after = next_code_point(begin, units.place(units.count()), &code_point);
+  *index += after == nullptr ? 1 : static_cast<uint64_t>(after - begin);
+  return after == nullptr ? 0xfffd : code_point;
+}
+
+// The size as UTF-8 of as many characters at the beginning as have no more than `limit` bytes.
+template <class Units>
+uint64_t shown_size(const Units& units, uint64_t limit) {
+  uint64_t size = 0;
+  for (uint64_t i = 0; i < units.count();) {
+    const unsigned more = utf8_size(next_character(units, &i));
+    if (more > limit - size) break;
+    size += more;
+  }
+  return size;
+}
+
+// Writes characters as UTF-8 until there are `size` bytes; returns the place after them.
+template <class Units>
+uint8_t* put_shown(uint8_t* out, const Units& units, uint64_t size) {
+  const uint8_t* const end = out + size;
+  for (uint64_t i = 0; out != end;) out = put_utf8(out, next_character(units, &i));
+  return out;
+}
+
 // The size of as many characters at the beginning of UTF-8 as have no more than `limit` bytes.
 inline uint64_t cut_size(Text text, uint64_t limit) {
   if (text.size <= limit) return text.size;
@@ -190,24 +231,17 @@ class FlatPairs {
   }
 
   At string(At at, const Text& path, const Text& last, Text text) {
+    if (!is_utf8(text.data, text.size)) return characters(at, path, last, Utf8Units(text));
     text.size = cut_size(text, largest_size());
     uint8_t* const value = string_pair(at, path, last, text.size);
     return value == nullptr ? at : copy_exactly(value, text.data, text.size);
   }
 
   template <class Units>
-  At wstring(At at, const Text& path, const Text& last, const Units& units) {
-    uint64_t size = 0, fitting = 0;
-    for (uint64_t i = 0; i < units.count();) {
-      size += utf8_size(next_character(units, &i));
-      if (size > largest_size()) break;
-      fitting = size;
-    }
-    uint8_t* value = string_pair(at, path, last, fitting);
-    if (value == nullptr) return at;
-    const uint8_t* const end = value + fitting;
-    for (uint64_t i = 0; value != end;) value = put_utf8(value, next_character(units, &i));
-    return value;
+  At characters(At at, const Text& path, const Text& last, const Units& units) {
+    const uint64_t size = shown_size(units, largest_size());
+    uint8_t* const value = string_pair(at, path, last, size);
+    return value == nullptr ? at : put_shown(value, units, size);
   }
 
   // Modules have no blobs.

@@ -71,7 +71,7 @@ class IndexText {
 class FlatSink : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false, kAnyText = true;
 
   // What there was outside of a submessage.
   struct Nested {
@@ -135,7 +135,7 @@ class FlatSink : public Stop {
 
   At string(const Operation& op, At at, int64_t element, Text text) {
     const FlatField& field = field_of(op);
-    if (field.map_key) return push({text.data, cut_size(text, kMaximumMapKey)}), at;
+    if (field.map_key) return push_key(text), at;
     return element_of(op, at, element,
                       [&](const Text& last) { return pairs_.string(at, path_, last, text); });
   }
@@ -143,7 +143,7 @@ class FlatSink : public Stop {
   template <class Units>
   At wstring(const Operation& op, At at, int64_t element, const Units& units) {
     return element_of(op, at, element,
-                      [&](const Text& last) { return pairs_.wstring(at, path_, last, units); });
+                      [&](const Text& last) { return pairs_.characters(at, path_, last, units); });
   }
 
   // As an array of uint8.
@@ -182,6 +182,12 @@ class FlatSink : public Stop {
   void push(const Text& text) {
     copy_exactly(set_.path + path_.size, text.data, text.size);
     path_.size += text.size;
+  }
+  void push_key(const Text& text) {
+    const Utf8Units units(text);
+    const uint64_t size = shown_size(units, kMaximumMapKey);
+    put_shown(set_.path + path_.size, units, size);
+    path_.size += size;
   }
   // Appends the name of a field to the path; returns what `leave` needs.
   uint64_t enter(const Operation& op) {

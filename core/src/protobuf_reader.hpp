@@ -332,7 +332,7 @@ class ProtobufReader {
       if (kSizes && text.size > op.string_bound &&
           !check_bound(op, text.data, utf8_code_points(text.data, text.size)))
         return failed();
-      if (kContent && !check_text(text)) return failed();
+      if (kContent && !Sink::kAnyText && !check_text(text)) return failed();
       return take(sink_.string(op, at, element, text));
     } else {
       if (kSizes && text.size % 2 != 0) return fail(Reason::OddWstring, text.data, text.size);

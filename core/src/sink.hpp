@@ -11,6 +11,7 @@
 //                 `position`, as `CdrWriter` does
 //   kMakesCdr     it makes CDR: it wants zeros for fields that protobuf does not have, and no string with NUL
 //                 inside
+//   kAnyText      it takes strings that are no UTF-8, which else are errors; only sinks that do say so
 //
 // and what a reader calls, each of which returns where it goes on:
 //
@@ -46,6 +47,8 @@ struct Text {
 
 // Why a sink stopped, and the number in the text of the reason.
 struct Stop {
+  static constexpr bool kAnyText = false;
+
   Reason reason = Reason::None;
   uint64_t detail = 0;
 };

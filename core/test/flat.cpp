@@ -466,15 +466,24 @@ TEST(text_of_the_page_is_cut_at_a_character) {
   }
 }
 
-TEST(text_may_have_nul_inside_where_no_cdr_is_made) {
-  const Plan plan = plan_of(CdrForm::String);
-  const Bytes proto = {0x0a, 3, 'a', 0, 'b'};
-  Flattener made = flattener(plan, FlatFormat::Released);
-  const Bytes pairs = flatten(made, Serialization::Protobuf, proto);
-  CHECK(pairs.size() > 3 && Bytes(pairs.end() - 3, pairs.end()) == (Bytes{'a', 0, 'b'}));
-  std::string error;
-  to_cdr(plan, proto, &error);
-  CHECK(error.find("the string contains NUL, which ends a string in ROS; remove it") != std::string::npos);
+// "a", a NUL, a byte that begins no character, a surrogate as UTF-8 (two of its three bytes are none), "z".
+TEST(any_bytes_are_text) {
+  const std::string shown = std::string("a\0", 2) + "\xef\xbf\xbd" + "\xef\xbf\xbd" + "\xef\xbf\xbd" + "z";
+  const Bytes text = {'a', 0, 0xff, 0xed, 0xa0, 'z'};
+  Bytes cdr = {7, 0, 0, 0};
+  Bytes proto = {0x0a, 6};
+  for (Bytes* const each : {&cdr, &proto}) each->insert(each->end(), text.begin(), text.end());
+  cdr.push_back(0);
+  for (const FlatFormat format : kFormats) {
+    Flattener made = flattener(plan_of(CdrForm::String), format);
+    const Bytes found = flatten(made, Serialization::Protobuf, proto);
+    CHECK(lines(format, found).find(shown + "\n") != std::string::npos);
+    CHECK(flatten(made, Serialization::Cdr, cdr_of(cdr)) == found);
+  }
+  // counts = {"x", a NUL, a byte that is none, "y"}
+  CHECK_EQUAL(general({0xa2, 2, 6, 0x0a, 4, 'x', 0, 0x80, 'y'}),
+              "/color STRING RED\n/tree/name STRING \n" + std::string("/counts/x\0", 10) +
+                  "\xef\xbf\xbdy INT64 0\n/small INT8 0\n/wide STRING \n");
 }
 
 TEST(messages_that_are_not_valid_have_no_pairs) {

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     Values: TypeAlias = "NDArray[Any] | list[str] | list[Blob]"
 
 _MAXIMUM_LAYOUTS = 16  # of one size, so that comparing with them costs less than reading
-_MAXIMUM_SIZES = 256
+_MAXIMUM_MEMORY = 16 << 20
+_FIELD_MEMORY = 200  # of a field, its key and its numbers, about
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,6 +68,18 @@ class Batch:
     times: NDArray[numpy.int64] | None
 
 
+class BatchError(PluginError):
+    """A plugin was stopped or broke its contract at a message of a batch.
+
+    Attributes:
+        batch: What it made of the messages before that one.
+    """
+
+    def __init__(self, reason: str, batch: Batch) -> None:
+        super().__init__(reason)
+        self.batch = batch
+
+
 @dataclass(slots=True)
 class _Template:
     """A layout, and the bytes that all outputs have that are laid out so.
@@ -81,20 +94,33 @@ class _Template:
     expected: NDArray[numpy.uint64]
     mask: NDArray[numpy.uint64]
 
+    @property
+    def memory(self) -> int:
+        """About how many bytes it takes."""
+        return 2 * self.mask.nbytes + _FIELD_MEMORY * (3 + len(self.layout.fields))
+
 
 class Templates:
     """The layouts that outputs of a parser have had, by the size of the output."""
 
     def __init__(self) -> None:
         self._by_size: dict[int, list[_Template]] = {}
+        self._memory = 0
 
-    def of_size(self, size: int) -> list[_Template]:
-        """Return those of outputs of a size, to add to."""
-        if size not in self._by_size:
-            if len(self._by_size) == _MAXIMUM_SIZES:
-                self._by_size.clear()
-            self._by_size[size] = []
-        return self._by_size[size]
+    def of_size(self, size: int) -> tuple[_Template, ...]:
+        """Return those of outputs of a size."""
+        return tuple(self._by_size.get(size, ()))
+
+    def keep(self, size: int, template: _Template) -> bool:
+        """Keep one more; False if there are enough of the size. All others are forgotten if they take too much."""
+        if len(self._by_size.get(size, ())) == _MAXIMUM_LAYOUTS:
+            return False
+        if self._memory + template.memory > _MAXIMUM_MEMORY:
+            self._by_size.clear()
+            self._memory = 0
+        self._memory += template.memory
+        self._by_size.setdefault(size, []).append(template)
+        return True
 
 
 class Collector:
@@ -103,6 +129,7 @@ class Collector:
     Attributes:
         messages: The messages of the batch.
         refused: The messages that the plugin did not take, by their index, and why.
+        done: How many of the messages were taken or refused.
     """
 
     def __init__(
@@ -110,6 +137,7 @@ class Collector:
     ) -> None:
         self.messages = messages
         self.refused: dict[int, str] = {}
+        self.done = 0
         self._read_layout = read_layout
         self._embedded_time = embedded_time
         self._templates = templates
@@ -117,14 +145,30 @@ class Collector:
         self._times = messages.times
 
     def add(self, outputs: Outputs) -> None:
-        """Take the outputs of some messages.
+        """Take the outputs of the next messages.
 
         Raises:
-            BrokenContract: An output is not what it should be.
+            BrokenContract: An output is not what it should be; those before it are taken.
         """
+        before, broken = self._parts, None
+        while True:
+            self._parts = {}
+            try:
+                self._add(outputs)
+                break
+            except BrokenContract as error:  # maybe not the first, as outputs are read by their size
+                broken, outputs = error, outputs.before(error.index)
+        for name, parts in self._parts.items():
+            before.setdefault(name, []).extend(parts)
+        self._parts = before
+        self.refused |= outputs.refused
+        self.done = outputs.end
+        if broken is not None:
+            raise broken
+
+    def _add(self, outputs: Outputs) -> None:
         region = numpy.frombuffer(outputs.memory, "u1")
         sizes = outputs.sizes
-        self.refused |= outputs.refused
         taken = numpy.flatnonzero(sizes > 0)
         distinct, firsts = numpy.unique(sizes[taken], return_index=True)
         for size in distinct[numpy.argsort(firsts)].tolist():
@@ -137,15 +181,13 @@ class Collector:
         """Take outputs that have the same size."""
         words = (size + 7) // 8
         matrix = _rows_of(region, begins, words)
-        templates = self._templates.of_size(size)
-        for template in templates:
+        for template in self._templates.of_size(size):
             if not len(rows):
                 return
             matrix, rows = self._take(template, matrix, rows)
         while len(rows):
             template = self._read(matrix[0].tobytes()[:size], int(rows[0]))
-            if len(templates) < _MAXIMUM_LAYOUTS:
-                templates.append(template)
+            if self._templates.keep(size, template):
                 matrix, rows = self._take(template, matrix, rows)
             else:
                 self._add_columns(template.layout, matrix[:1], rows[:1])
@@ -209,12 +251,13 @@ class Collector:
         self._times[rows] = found
 
     def batch(self) -> Batch:
-        """Return what was collected."""
+        """Return what was collected: the messages that are done."""
         columns = []
         for (key, kind), parts in self._parts.items():
             rows, values = parts[0] if len(parts) == 1 else _merged(parts)
             columns.append(Column(key, kind, rows, values))
-        return Batch(len(self.messages), tuple(columns), self.refused, self._times)
+        times = None if self._times is None else self._times[: self.done]
+        return Batch(self.done, tuple(columns), self.refused, times)
 
 
 def _rows_of(region: NDArray[Any], begins: NDArray[numpy.uint32], words: int) -> NDArray[numpy.uint64]:

@@ -70,6 +70,8 @@ def read_program(plugin: str | Path | bytes) -> Program:
     Args:
         plugin: Its file, or its bytes.
 
+    Compiling has no limit of time but that of the size of the file; the largest ones may take a minute.
+
     Raises:
         PluginError: It cannot be read, is too large, or is no WebAssembly, or there is no engine to run it.
     """
@@ -169,6 +171,8 @@ class Instance:
             raise PluginError(
                 f"{program.name}: imports {', '.join(unknown)}, which a plugin does not get; build it without imports"
             )
+        if program.file.memories > 1:  # the limit holds for each of them
+            raise PluginError(f"{program.name}: it has {program.file.memories} memories; a plugin has one")
         self.program = program
         self.store = wasmtime.Store(engine())
         self._limits = limits
@@ -192,7 +196,7 @@ class Instance:
                 break
 
     def _limit_memory(self, size: int) -> None:
-        self.store.set_limits(memory_size=size, table_elements=100_000, instances=4, tables=10, memories=10)
+        self.store.set_limits(memory_size=size, table_elements=100_000, instances=4, tables=10, memories=2)
 
     def grow(self, memory: wasmtime.Memory, size: int) -> None:
         """Make a memory of ours larger, for which the plugin's limit does not hold."""
@@ -298,7 +302,7 @@ def write(view: memoryview, address: int, data: Buffer) -> None:
 def _trap(trap: wasmtime.Trap) -> Trap:
     import wasmtime
 
-    reason = trap.message.rpartition("wasm trap: ")[2].splitlines()[0]
+    reason = trap.message.rpartition("wasm trap: ")[2].partition("\n")[0] or "it says no reason"
     code = trap.trap_code
     if code is wasmtime.TrapCode.OUT_OF_FUEL:
         return Trap("it took too many instructions", out_of_instructions=True)

@@ -27,6 +27,8 @@ class FunctionsSession(Session):
     def __init__(self, program: Program, dialect: Dialect, limits: Limits) -> None:
         super().__init__(program, dialect, limits)
         self._room = self._output_room()
+        # What parsers were made of: the released host keeps these texts as long as the parser, which may point to them.
+        self._texts: dict[int, list[list[tuple[int, int]]]] = {}
 
     def _output_room(self) -> tuple[int, int]:
         """Return where outputs begin, and where the guard of the last one begins at the latest."""
@@ -39,25 +41,34 @@ class FunctionsSession(Session):
         )
 
     def create(self, request: ParserRequest) -> int:
+        policy = request.array_policy
+        if policy is not None and "pj_parser_set_array_policy" not in self.instance.program.functions:
+            raise PluginError("it does not export pj_parser_set_array_policy, so arrays stay as it has them")
         topic = request.topic if self.dialect.name == "page" else ""  # the released host gives none
-        addresses = []
-        for text in (topic.encode(), request.type_name.encode(), request.schema):
-            addresses.append(self.allocate(len(text) + 1, "a text"))
-            write(self.instance.view(), addresses[-1], text + b"\0")
-        handle: int = self.instance.call("pj_parser_create", *addresses)
-        if not handle:
-            raise PluginError("pj_parser_create returned 0: it does not take the type or the schema")
-        if (policy := request.array_policy) is not None:
-            if "pj_parser_set_array_policy" not in self.instance.program.functions:
-                raise PluginError(
-                    "it does not export pj_parser_set_array_policy, so arrays stay as it has them"
-                )
+        texts: list[tuple[int, int]] = []
+        try:
+            for text in (topic.encode(), request.type_name.encode(), request.schema):
+                texts.append((self.allocate(len(text) + 1, "a text"), len(text) + 1))
+                write(self.instance.view(), texts[-1][0], text + b"\0")
+            handle: int = self.instance.call("pj_parser_create", *(address for address, _ in texts))
+            if not handle:
+                raise PluginError("pj_parser_create returned 0: it does not take the type or the schema")
+        except PluginError:
+            self._free_texts(texts)
+            raise
+        self._texts.setdefault(handle, []).append(texts)
+        if policy is not None:
             self.instance.call("pj_parser_set_array_policy", handle, policy.clamp, policy.maximum)
         return handle
 
     def destroy(self, handle: int) -> None:
         if "pj_parser_destroy" in self.instance.program.functions:
             self.instance.call("pj_parser_destroy", handle)
+        self._free_texts(self._texts[handle].pop())
+
+    def _free_texts(self, texts: list[tuple[int, int]]) -> None:
+        for address, size in texts:
+            self.free(address, size)
 
     def free(self, address: int, size: int) -> None:
         functions = self.instance.program.functions

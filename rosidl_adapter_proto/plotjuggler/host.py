@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy
 
 from rosidl_adapter_proto.errors import PluginError, RequestError
-from rosidl_adapter_proto.plotjuggler.columns import Batch, Collector, Templates
+from rosidl_adapter_proto.plotjuggler.columns import Batch, BatchError, Collector, Templates
 from rosidl_adapter_proto.plotjuggler.dialects import DIALECTS, Dialect, served_dialects
 from rosidl_adapter_proto.plotjuggler.engine import Instance, Limits, Program, Trap, read_program
 from rosidl_adapter_proto.plotjuggler.functions import FunctionsSession
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArrayPolicy",
+    "BatchError",
     "Blob",
     "BuiltinType",
     "Limits",
@@ -222,7 +223,10 @@ def manifest_text(instance: Instance) -> str:
 
 
 class Parser:
-    """Parses the messages of a topic. A context manager, which gives back what it has in the plugin."""
+    """Parses the messages of a topic. A context manager, which gives back what it has in the plugin.
+
+    One that is not closed keeps that as long as its plugin runs.
+    """
 
     def __init__(self, plugin: Plugin, request: ParserRequest, embedded_time: bool) -> None:
         self._plugin = plugin
@@ -292,7 +296,7 @@ class Parser:
             times: When each was recorded, in nanoseconds since 1970: a number of 64 bits for each.
 
         Raises:
-            PluginError: The plugin was stopped, or did what its contract forbids.
+            BatchError: The plugin was stopped, or did what its contract forbids; the error has what came before that.
             RequestError: A range is not within `data`, or there are not as many times as messages.
         """
         messages = _messages(memoryview(data).cast("B"), ranges, times)
@@ -301,14 +305,19 @@ class Parser:
             for outputs in self._outputs(messages):
                 collector.add(outputs)
         except BrokenContract as broken:
-            raise self._broken(broken.index, broken.reason) from None
-        return collector.batch()
+            reason = str(self._broken(broken.index, broken.reason))
+        except PluginError as error:
+            reason = str(error)
+        else:
+            return collector.batch()
+        raise BatchError(reason, collector.batch())
 
     def _outputs(self, messages: Messages) -> Iterator[Outputs]:
         """Run messages through the plugin, and return what it writes as often as there is no more room for it.
 
         Raises:
-            PluginError: The plugin was stopped, or did what its contract forbids.
+            BrokenContract: The plugin was stopped, or did what its contract forbids.
+            PluginError: It cannot be started, has no memory, or does not make the parser again.
         """
         first = 0
         while first < len(messages):
@@ -323,7 +332,7 @@ class Parser:
                     if done > before:
                         yield session.outputs(first, before, done)
                     if stop not in (Stop.DONE, Stop.FULL) or done == before:
-                        raise self._broken(first + done, session.offence(stop, done))
+                        raise BrokenContract(first + done, session.offence(stop, done))
             except Trap as trap:
                 before, done = done, session.done if count else 0
                 if done > before:
@@ -331,7 +340,7 @@ class Parser:
                 self._plugin.discard()
                 # Many messages together may take more instructions than one may.
                 if not (trap.out_of_instructions and done > before):
-                    raise self._broken(first + done, f"it was stopped: {trap.reason}") from None
+                    raise BrokenContract(first + done, f"it was stopped: {trap.reason}") from None
             first += done
 
     def _ready(self) -> Session:
@@ -362,6 +371,10 @@ class Parser:
 
 
 def _messages(data: memoryview, ranges: Buffer, times: Buffer | None) -> Messages:
+    if memoryview(ranges).nbytes % 16:
+        raise RequestError(f"the ranges have {memoryview(ranges).nbytes} bytes; a range has 16")
+    if times is not None and memoryview(times).nbytes % 8:
+        raise RequestError(f"the times have {memoryview(times).nbytes} bytes; a time has 8")
     pairs = numpy.frombuffer(memoryview(ranges), "<u8").reshape(-1, 2)
     begins, ends = pairs[:, 0], pairs[:, 1]
     if len(pairs) and (bool((begins > ends).any()) or int(ends.max()) > len(data)):

@@ -24,6 +24,8 @@ OUTPUTS = TABLE_SIZE + 8
 """Where in it the outputs of modules begin."""
 GUARD = b"\xa5\x5a\xc3\x3c\x96\x69\xf0\x0f"
 """What stands behind the room that an output has, and must still stand there when it is written."""
+BAD_TOKEN = -2
+"""What a module returns if it does not know the parser that it is given."""
 ERROR_SIZE = 512
 """How many bytes the text of an error of a module has at most."""
 
@@ -84,13 +86,16 @@ _MODULE = f"""
   (import "plugin" "function" (func $parse (param i64 i64 i64 i64 i64) (result i32)))
   (import "plugin" "pj_module_last_error" (func $last_error (param i64 i64 i64) (result i64)))
   (memory $own (export "memory") {(TABLE_SIZE >> 16) + 1})
-  (func (export "run") (param $self i64) (param $count i32) (param $out i32) (param $end i32) (param $slots i32)
+  (func (export "run")
+    (param $self i64) (param $count i32) (param $out i32) (param $end i32) (param $capacity i32) (param $slots i32)
     (result i32)
     (local $next i32) (local $row i32) (local $code i32) (local $address i64) (local $size i64) (local $memory_size i64)
     (local.set $next (i32.load $own (i32.const {NEXT})))
     (local.set $row (i32.mul (local.get $next) (i32.const {ROW_SIZE})))
     (loop $messages
       (if (i32.eq (local.get $next) (local.get $count)) (then (return (i32.const {Stop.DONE:d}))))
+      (if (i32.gt_u (local.get $capacity) (i32.sub (local.get $end) (local.get $out)))
+        (then (return (i32.const {Stop.FULL:d}))))
       (i64.store $plugin (local.get $slots) (i64.const 0))
       (i64.store $plugin offset=8 (local.get $slots) (i64.const 0))
       (local.set $code (call $parse
@@ -100,7 +105,8 @@ _MODULE = f"""
         (i64.extend_i32_u (local.get $slots))
         (i64.extend_i32_u (i32.add (local.get $slots) (i32.const 8)))))
       (i32.store $own offset=12 (local.get $row) (local.get $code))
-      (if (i32.gt_s (local.get $code) (i32.const 0)) (then (return (i32.const {Stop.BAD_RESULT:d}))))
+      (if (i32.or (i32.gt_s (local.get $code) (i32.const 0)) (i32.eq (local.get $code) (i32.const {BAD_TOKEN})))
+        (then (return (i32.const {Stop.BAD_RESULT:d}))))
       (local.set $address (i64.load $plugin (local.get $slots)))
       (local.set $size (i64.load $plugin offset=8 (local.get $slots)))
       (if (i32.lt_s (local.get $code) (i32.const 0))
@@ -116,8 +122,8 @@ _MODULE = f"""
           (i32.or (i64.eqz (local.get $address)) (i64.gt_u (local.get $address) (local.get $memory_size)))
           (i64.gt_u (local.get $size) (i64.sub (local.get $memory_size) (local.get $address))))
         (then (return (i32.const {Stop.BAD_DESCRIPTOR:d}))))
-      (if (i64.gt_u (local.get $size) (i64.extend_i32_u (i32.sub (local.get $end) (local.get $out))))
-        (then (return (i32.const {Stop.FULL:d}))))
+      (if (i64.gt_u (local.get $size) (i64.extend_i32_u (local.get $capacity)))
+        (then (return (i32.const {Stop.TOO_LARGE:d}))))
       (memory.copy $own $plugin
         (local.get $out) (i32.wrap_i64 (local.get $address)) (i32.wrap_i64 (local.get $size)))
       (i32.store $own offset=8 (local.get $row) (local.get $out))

@@ -10,10 +10,9 @@ import numpy
 from rosidl_adapter_proto.errors import PluginError
 from rosidl_adapter_proto.plotjuggler.dialects import Dialect
 from rosidl_adapter_proto.plotjuggler.engine import Limits, Program, write
-from rosidl_adapter_proto.plotjuggler.loops import ERROR_SIZE, OUTPUTS, Stop
+from rosidl_adapter_proto.plotjuggler.loops import BAD_TOKEN, ERROR_SIZE, OUTPUTS, Stop
 from rosidl_adapter_proto.plotjuggler.module_manifest import Claim, ModuleManifest
 from rosidl_adapter_proto.plotjuggler.session import (
-    BrokenContract,
     Messages,
     Outputs,
     Packed,
@@ -24,6 +23,8 @@ from rosidl_adapter_proto.plotjuggler.values import shown
 
 OUTPUT_CAPACITY = 16 << 20
 """How many bytes an output may have here; the contract has no limit but memory."""
+OUTPUT_ROOM = OUTPUT_CAPACITY + (4 << 20)
+"""Where outputs are copied to; when it has no room for the largest, it is emptied before another message is parsed."""
 INPUT_HEADER = struct.Struct("<B7xqQ")
 BINDING_HEADER = struct.Struct("<HHIHHI")
 SCALAR_ROUTE = 1
@@ -41,7 +42,7 @@ class ModuleSession(Session):
         self._manifest = manifest
         # Where the module says where its output is, two numbers of 64 bits, and room for the text of an error.
         self._slots = self.allocate(16 + ERROR_SIZE, "results")
-        self.instance.grow(self._loop["memory"], OUTPUT_CAPACITY)
+        self.instance.grow(self._loop["memory"], OUTPUT_ROOM)
 
     def create(self, request: ParserRequest) -> int:
         if request.array_policy is not None:
@@ -81,8 +82,10 @@ class ModuleSession(Session):
         self.instance.call("pj_module_free", address, size)
 
     def run(self, handle: int, count: int) -> Stop:
-        end = OUTPUTS + OUTPUT_CAPACITY
-        return Stop(self.instance.call_function(self._loop["run"], handle, count, OUTPUTS, end, self._slots))
+        room = OUTPUTS, OUTPUTS + OUTPUT_ROOM
+        return Stop(
+            self.instance.call_function(self._loop["run"], handle, count, *room, OUTPUT_CAPACITY, self._slots)
+        )
 
     def outputs(self, first: int, begin: int, end: int) -> Outputs:
         rows = self._rows(begin, end)
@@ -91,10 +94,6 @@ class ModuleSession(Session):
         refused = {}
         for at in numpy.flatnonzero(codes < 0).tolist():
             place, size = rows[at, 2], rows[at, 1]
-            if codes[at] == BAD_TOKEN:
-                raise BrokenContract(
-                    first + begin + at, "pj_module_parse does not know the token that it gave (-2)"
-                )
             text = _error_text(bytes(own[place : place + size]))
             refused[first + begin + at] = f"pj_module_parse returned {codes[at]}: {text}"
         return Outputs(first + begin, own, rows[:, 2], codes, refused)
@@ -103,6 +102,8 @@ class ModuleSession(Session):
         address, size = struct.unpack_from("<QQ", self.instance.view(), self._slots)
         if stop is Stop.BAD_RESULT:
             code = self._rows(row, row + 1)[0, 3].astype("<i4")
+            if code == BAD_TOKEN:
+                return f"pj_module_parse does not know the token that it gave ({code})"
             if code > 0:
                 return f"pj_module_parse returned {code}, which means nothing"
             return f"pj_module_last_error wrote more than the {ERROR_SIZE} bytes that it may write"
@@ -114,9 +115,6 @@ class ModuleSession(Session):
     def _pack(self, messages: Messages, first: int, last: int) -> Packed:
         sizes = messages.sizes[first:last] + INPUT_HEADER.size
         return Packed(b"".join(_inputs(messages, first, last)), numpy.cumsum(sizes) - sizes, sizes)
-
-
-BAD_TOKEN = -2
 
 
 def _inputs(messages: Messages, first: int, last: int) -> Iterator[bytes | memoryview]:

@@ -102,6 +102,17 @@ class Outputs:
     sizes: NDArray[numpy.int32]
     refused: dict[int, str] = field(default_factory=dict)
 
+    @property
+    def end(self) -> int:
+        """The index after that of the last of them."""
+        return self.first + len(self.begins)
+
+    def before(self, index: int) -> Outputs:
+        """Return those of messages before one."""
+        count = index - self.first
+        refused = {each: reason for each, reason in self.refused.items() if each < index}
+        return Outputs(self.first, self.memory, self.begins[:count], self.sizes[:count], refused)
+
 
 class BrokenContract(Exception):
     """A plugin did what its dialect forbids.
@@ -172,9 +183,6 @@ class Session(abc.ABC):
             first: The index of the first of those that were loaded.
             begin: The first of them.
             end: The one after the last of them.
-
-        Raises:
-            BrokenContract: The plugin returned what it may not.
         """
 
     @abc.abstractmethod
@@ -212,7 +220,10 @@ class Session(abc.ABC):
                 self._input = (0, 0)
                 self.free(address, room)
             room = max(2 * room, size, PAGE)
-            address = self.allocate(room, "messages")
+            address = self.instance.allocate(room)
+            if not address:
+                room = size
+                address = self.allocate(room, "messages")
             self._input = address, room
         return address
 

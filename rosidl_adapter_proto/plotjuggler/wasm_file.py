@@ -63,6 +63,7 @@ class WasmFile:
         other_exports: The names of its other exports, without its memory.
         imports: What it imports.
         has_memory: Whether it exports its memory as `memory`.
+        memories: How many memories it has, with those that it imports.
         memory_maximum: How many bytes that may have, by what the file says itself; None for no maximum.
         has_start: Whether it runs something by itself once it is loaded.
     """
@@ -71,6 +72,7 @@ class WasmFile:
     other_exports: tuple[str, ...]
     imports: tuple[Import, ...]
     has_memory: bool
+    memories: int
     memory_maximum: int | None
     has_start: bool
 
@@ -110,7 +112,9 @@ def read_wasm_file(data: bytes) -> WasmFile:
             else:
                 others.append(name)
     maximum = None if memory is None else _at(memories, memory)
-    return WasmFile(exports, tuple(others), tuple(imports), memory is not None, maximum, _START in found)
+    return WasmFile(
+        exports, tuple(others), tuple(imports), memory is not None, len(memories), maximum, _START in found
+    )
 
 
 def custom_sections(data: bytes, name: str) -> list[bytes]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from array import array
 from pathlib import Path
 
 import pytest
+import wasmtime
 
 from rosidl_adapter_proto.errors import PluginError, RequestError
 from rosidl_adapter_proto.plotjuggler import engine
-from rosidl_adapter_proto.plotjuggler.host import Limits, open_plugin
+from rosidl_adapter_proto.plotjuggler.host import BatchError, Limits, open_plugin
 from rosidl_adapter_proto.plotjuggler.values import BuiltinType
 from tests.plotjuggler import outputs, wat
 
@@ -25,10 +27,11 @@ def failure(plugin: bytes, message: bytes = GOOD) -> str:
     """Return the error of a message, alone and in a batch, which are the same."""
     with pytest.raises(PluginError) as alone:
         open_plugin(plugin, limits=QUICK).parser("/topic", "a/Type", b"").parse(message)
-    with pytest.raises(PluginError) as batch:
+    with pytest.raises(BatchError) as batch:
         ranges = array("Q", [0, len(message)])
         open_plugin(plugin, limits=QUICK).parser("/topic", "a/Type", b"").parse_batch(message, ranges)
     assert str(alone.value) == str(batch.value)
+    assert batch.value.batch.count == 0
     return str(alone.value)
 
 
@@ -74,8 +77,10 @@ def test_after_a_trap_the_plugin_begins_anew() -> None:
     assert [other.parse(GOOD).pairs[0].value, parser.parse(GOOD).pairs[0].value] == [1, 2]
     size = len(GOOD)
     ranges = array("Q", [0, size] * 3 + [0, 0] + [0, size])
-    with pytest.raises(PluginError, match="message 3: it was stopped"):
+    with pytest.raises(BatchError, match="message 3: it was stopped") as caught:
         parser.parse_batch(GOOD, ranges)
+    assert caught.value.batch.count == 3
+    assert caught.value.batch.columns[0].values.tolist() == [3, 4, 5]  # type: ignore[union-attr]
     assert parser.parse_batch(GOOD, ranges[8:]).columns[0].values.tolist() == [1]  # type: ignore[union-attr]
 
 
@@ -203,6 +208,7 @@ REFUSED = {
     wat.plugin(
         memory="5000"
     ): "plugin: cannot be started: memory minimum size of 5000 pages exceeds memory limits",
+    wat.plugin(more="(memory 1) (memory 1)"): "plugin: it has 3 memories; a plugin has one",
     wat.plugin(manifest="name: x\nencoding: y"): "manifest: the released PlotJuggler sees no plugin_type",
     wat.plugin(manifest="\xff").replace(b"\xc3\xbf", b"\xff\xff"): "manifest: byte 0 is not UTF-8",
     wat.plugin(manifest="a" * 65_536): "no text of at most 65536 bytes and a NUL byte at address 16",
@@ -267,11 +273,36 @@ def test_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         open_plugin(tmp_path)
 
 
+def test_the_messages_before_a_broken_one_are_not_lost() -> None:
+    """Outputs are read by their size, so that the second broken one is found first, and what is behind it after it."""
+    long = outputs.released(("/long", BuiltinType.UINT16, b"\1\0"))
+    broken, broken_long = (each[:4] + b"\xff" * 4 + each[8:] for each in (GOOD, long))
+    messages = [GOOD, long, b"", long, broken_long, GOOD, broken, long]
+    ends = list(itertools.accumulate(map(len, messages)))
+    ranges = array("Q", [each for pair in zip([0, *ends], ends, strict=False) for each in pair])
+    parser = open_plugin(wat.plugin()).parser("/topic", "a/Type", b"")
+    times = array("q", range(len(messages)))
+    with pytest.raises(BatchError, match="message 4: byte 8: ") as caught:
+        parser.parse_batch(b"".join(messages), ranges, times)
+    batch = caught.value.batch
+    assert (batch.count, batch.refused) == (4, {2: "pj_parser_decode returned 0"})
+    assert batch.times is not None and batch.times.tolist() == [0, 1, 2, 3]
+    assert [(each.key, each.messages.tolist()) for each in batch.columns] == [("/x", [0]), ("/long", [1, 3])]
+
+
+def test_reasons_that_are_empty() -> None:
+    assert engine._trap(wasmtime.Trap("")).reason == "it says no reason"
+
+
 def test_ranges_and_texts_that_are_wrong() -> None:
     parser = open_plugin(wat.plugin()).parser("/topic", "a/Type", b"")
     for ranges in ([0, 4], [3, 2], [2**64 - 1, 2**64 - 1]):
         with pytest.raises(RequestError, match="a range of a message is not within the 3 bytes of data"):
             parser.parse_batch(b"abc", array("Q", ranges))
+    with pytest.raises(RequestError, match="the ranges have 24 bytes; a range has 16"):
+        parser.parse_batch(b"abc", array("Q", [0, 3, 3]))
+    with pytest.raises(RequestError, match="the times have 4 bytes; a time has 8"):
+        parser.parse_batch(b"abc", array("Q", [0, 3]), b"1234")
     with pytest.raises(RequestError, match="there are 1 messages and 2 times"):
         parser.parse_batch(b"abc", array("Q", [0, 3]), array("q", [1, 2]))
     with pytest.raises(RequestError, match="a topic and a type have no NUL byte"):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 from array import array
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import pytest
 
-from rosidl_adapter_proto.plotjuggler.host import Parser, open_plugin
+from rosidl_adapter_proto.plotjuggler.host import Limits, Parser, open_plugin
 from rosidl_adapter_proto.plotjuggler.values import ArrayPolicy, Blob, BuiltinType, Pair
 from tests.plotjuggler import outputs, wat
 
@@ -239,3 +240,56 @@ def test_several_parsers_and_dialects_of_one_plugin() -> None:
     message = outputs.released(number("/x", BuiltinType.INT32, 1))
     with plugin.parser("/a", "T", b"") as first, plugin.parser("/b", "T", b"") as second:
         assert first.parse(message) == second.parse(message)
+
+
+def test_a_module_sees_each_message_once() -> None:
+    """It answers all with the first message, counting in /x: outputs have more bytes than there is room for at once."""
+    parse = """
+      (if (i64.eqz (global.get $kept)) (then
+        (global.set $kept (i64.add (local.get $in) (i64.const 24)))
+        (global.set $kept_size (i64.sub (local.get $size) (i64.const 24)))))
+      (global.set $count (i64.add (global.get $count) (i64.const 1)))
+      (i64.store offset=33 (i32.wrap_i64 (global.get $kept)) (global.get $count))
+      (i64.store (i32.wrap_i64 (local.get $address_slot)) (global.get $kept))
+      (i64.store (i32.wrap_i64 (local.get $size_slot)) (global.get $kept_size))
+      (i32.const 0)"""
+    names = ("kept", "kept_size", "count")
+    plugin = wat.module(parse, more="".join(f"(global ${name} (mut i64) (i64.const 0))" for name in names))
+    text = "/text", BuiltinType.STRING, b"t" * 200_000
+    first = outputs.module(number("/x", BuiltinType.INT64, 0), text)
+    batch = open_plugin(plugin).parser("/t", "a/T", b"").parse_batch(*joined([first, *[b""] * 200]))
+    assert batch.columns[0].values.tolist() == list(range(1, 202))  # type: ignore[union-attr]
+
+
+def test_a_larger_message_takes_no_more_than_it_needs_where_memory_is_short() -> None:
+    parser = open_plugin(wat.plugin("(i32.const 0)"), limits=Limits(memory=7 << 20)).parser("/t", "a/T", b"")
+    for size in (1 << 20, (1 << 20) + 1):
+        assert parser.parse(bytes(size)).refused
+
+
+def test_texts_are_given_back_with_the_parser() -> None:
+    """Each is larger than the plugin's memory would be for three; the plugin frees what was allocated last."""
+    free = """
+      (func (export "free") (param $address i32)
+        (if (i32.lt_u (local.get $address) (global.get $heap)) (then (global.set $heap (local.get $address)))))"""
+    plugin = open_plugin(wat.plugin(malloc=wat.MALLOC + free), limits=Limits(memory=8 << 20))
+    refused = open_plugin(
+        wat.plugin(malloc=wat.MALLOC + free, create="(i32.const 0)"), limits=Limits(memory=8 << 20)
+    )
+    for _ in range(5):
+        plugin.parser("/t", "a/T", bytes(1 << 20)).close()
+        with pytest.raises(Exception, match="pj_parser_create returned 0"):
+            refused.parser("/t", "a/T", bytes(1 << 20))
+
+
+def test_layouts_that_are_kept_take_little_memory() -> None:
+    parser = echo("released")
+    messages = [
+        outputs.released(*[number("/x", BuiltinType.UINT8, 0)] * count) for count in range(20_000, 20_012)
+    ]
+    tracemalloc.start()
+    for message in messages:
+        parser.parse_batch(message, array("Q", [0, len(message)]))
+    kept, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert kept < 20 << 20

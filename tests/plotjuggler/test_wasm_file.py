@@ -50,10 +50,11 @@ def test_what_a_file_has() -> None:
             Import("b.global", None),
         ),
         has_memory=True,
+        memories=2,
         memory_maximum=300 << 16,
         has_start=True,
     )
-    assert read_wasm_file(wat.wasm("(module)")) == WasmFile({}, (), (), False, None, False)
+    assert read_wasm_file(wat.wasm("(module)")) == WasmFile({}, (), (), False, 0, None, False)
     assert str(function) == "(v128, funcref) -> i32, externref"
 
 

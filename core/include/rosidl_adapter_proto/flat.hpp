@@ -2,6 +2,7 @@
 //
 // Keys are paths such as `/header/stamp/sec` and `/ranges[0]`, made of the names of fields. What a pair looks
 // like is said by the format; how a message is serialized, by the reader that drives the sink.
+// Any bytes are text: one that is part of no character of UTF-8 is shown as U+FFFD, and a NUL as a NUL.
 #pragma once
 
 #include <cstdint>
