@@ -120,10 +120,12 @@ def require_plotjuggler() -> None:
 
 
 def _list_series(series: Iterable[Series]) -> None:
+    from rosidl_adapter_proto.plotjuggler.values import shown
+
     rows = [("topic", "key", "type", "count", "first", "last")]
     for each in series:
         first, last = _value_text(each.values, 0), _value_text(each.values, -1)
-        rows.append((each.topic, each.key, each.type_name, str(len(each)), first, last))
+        rows.append((shown(each.topic), shown(each.key), each.type_name, str(len(each)), first, last))
     widths = [max(len(row[column]) for row in rows) for column in range(5)]
     for topic, key, kind, count, first, last in rows:
         left = f"{topic:{widths[0]}}  {key:{widths[1]}}  {kind:{widths[2]}}"

@@ -92,7 +92,7 @@ class ArrayPolicy:
 
 
 def shown(text: str) -> str:
-    """Return a text of a plugin such that it can stand in an error: short, and without what controls a terminal."""
+    """Return a text of a plugin or a bag as it can be printed: short, and without what controls a terminal."""
     cut = text if len(text) <= _MAXIMUM_SHOWN else text[:_MAXIMUM_SHOWN] + "..."
     return cut if cut.isprintable() else ascii(cut)
 

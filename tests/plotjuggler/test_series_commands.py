@@ -65,6 +65,19 @@ def test_what_is_missing_is_told_and_makes_exit_code_1(tmp_path: Path, run: Run)
     )
 
 
+def test_names_cannot_control_a_terminal(tmp_path: Path, run: Run) -> None:
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/Bool", "ros2msg", b"bool data\n")
+        writer.add_message(writer.register_channel("/\x1b[2J", "cdr", schema), 0, b"\0\1\0\0\1", 0)
+        writer.finish()  # type: ignore[no-untyped-call]
+    outcome = run("plotjuggler", "series", str(path))
+    assert (outcome.code, outcome.err) == (0, "")
+    assert outcome.out.splitlines()[1].startswith(r"'/\x1b[2J'  /data  bool ")
+
+
 @pytest.mark.parametrize(
     ("options", "code", "text"),
     [
