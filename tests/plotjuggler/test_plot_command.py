@@ -57,6 +57,14 @@ def test_a_picture(run: Run, asked: dict[str, Any], folder: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == ["bag.mcap", "x.PNG"]
 
 
+def test_a_damaged_bag(run: Run, folder: Path) -> None:
+    whole = (folder / "bag.mcap").read_bytes()
+    (folder / "bag.mcap").write_bytes(whole[: len(whole) // 2])
+    code, out, err = run("--output", "x.png", "--salvage")
+    assert (code, out) == (1, "x.png: 3 series, 2100 values\n")
+    assert "bag.mcap: " in err
+
+
 def test_a_page(run: Run, folder: Path) -> None:
     assert run("-o", "x.html", "--title", "A <walk>")[:2] == (1, "x.html: 3 series, 2100 values\n")
     assert "<title>A &lt;walk&gt;</title>" in (folder / "x.html").read_text(encoding="utf-8")
