@@ -1,8 +1,8 @@
 """The command line, `rosidl-proto`: parses, calls, prints.
 
-Exit codes: 0 done; 1 `--check` found something stale, `bag convert` left something out, another command did of a
-damaged bag, or what reads the output went away; 2 the command line or its configuration is wrong; 3 the work could not
-be done (a definition, a lock file, the output folder or protoc is at fault); 130 interrupted.
+Exit codes: 0 done; 1 `--check` found something stale, something of a bag was left out, `plotjuggler check` found no
+contract that is met, or what reads the output went away; 2 the command line or its configuration is wrong; 3 the work
+could not be done (a definition, a lock file, the output folder or protoc is at fault); 130 interrupted.
 """
 
 from __future__ import annotations
