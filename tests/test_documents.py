@@ -62,7 +62,7 @@ def test_blocks_run(document: Path, installed: Path, recording: Path, tmp_path: 
     if document.name in BUILDS:
         pytest.skip("run by tests/hooks")
     if document.name in PLOTS:
-        pytest.skip("run by tests/plotjuggler/test_plots_page.py")
+        pytest.skip("run by tests/plotjuggler")
     if document.name in FRAMES:
         pytest.skip("run by tests/bags/peers")
     shutil.copytree(recording, tmp_path / "recording")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
+from tests.plotjuggler.topics import ENCODINGS
 
 
 @pytest.fixture
@@ -18,4 +19,4 @@ def plugin(encoding: str) -> Path:
 @pytest.fixture(scope="session")
 def plugin_files() -> dict[str, Path]:
     """All of them, by their encodings."""
-    return {encoding: plugin_path(encoding) for encoding in ("protobuf", "ros2msg")}
+    return {encoding: plugin_path(encoding) for encoding in ENCODINGS}

@@ -45,15 +45,15 @@ def test_plugins_are_the_same_wherever_they_are_built(moved_core: Path, tmp_path
 
 
 def test_what_the_compiler_says(moved_core: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(build, "_SOURCES", ("wasm/plugin.cpp",))
+    monkeypatch.setattr(build, "_SOURCES", ())
     shutil.rmtree(moved_core / "src" / "schema")
-    (moved_core / "wasm" / "plugin.cpp").write_text("this is not C++\n")
+    (moved_core / "wasm" / "protobuf.cpp").write_text("this is not C++\n")
     output = tmp_path / "output"
     with pytest.raises(
         PluginError, match=r"^the compiler failed to build protobuf\.wasm, with exit code 1:\n"
     ) as raised:
         build_plugins(output)
-    assert "wasm/plugin.cpp:1:1: error: " in str(raised.value)
+    assert "wasm/protobuf.cpp:1:1: error: " in str(raised.value)
     assert list(output.iterdir()) == []
 
 
