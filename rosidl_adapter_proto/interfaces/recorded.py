@@ -76,14 +76,12 @@ def recorded_definitions(data: bytes, encoding: str, type_name: str, where: str)
     found: dict[TypeName, _Section] = {}
     for section in _sections(text, encoding, type_name, where):
         other = found.get(section.name)
-        if (
-            other is None or section.text
-        ):  # rosbag2 has an empty section where it found no .msg, beside that of the .idl
+        # rosbag2 has an empty section where it found no .msg, beside that of the .idl.
+        if other is None or section.text:
             if other and other.text and section.text.split() != other.text.split():
                 raise DefinitionError(f"{where}: {section.name} is defined twice, not in the same way")
-            found[section.name] = (
-                section  # compared with the next one, so that a long one is looked at only twice
-            )
+            # The next one is compared with this one, so that a long one is looked at only twice.
+            found[section.name] = section
         if len(found) > MAXIMUM_DEFINITIONS:
             raise DefinitionError(f"{where}: the definition has more than {MAXIMUM_DEFINITIONS} types")
     return {

@@ -9,7 +9,6 @@ from pathlib import Path
 from rosidl_adapter_proto.errors import PluginError
 from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
 
-VERSIONS = ("3", "4")
 NAMES = {"protobuf": "rosidl_proto_protobuf.wasm", "ros2msg": "rosidl_proto_ros2msg.wasm"}
 """What our plugins are called there, by their encodings: PlotJuggler 3 loads one file of a name."""
 

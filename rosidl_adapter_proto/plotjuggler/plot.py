@@ -139,9 +139,8 @@ def plot_of(
     """
     chosen, notes = _drawable(found.series, fields)
     names = [SeriesNames([each]) for each in fields]
-    chosen.sort(
-        key=lambda series: [not each.is_chosen(series.name) for each in names]
-    )  # as they were asked for
+    # As they were asked for.
+    chosen.sort(key=lambda series: [not each.is_chosen(series.name) for each in names])
     lines = []
     for each, colour in zip(chosen, COLOURS, strict=False):
         line, line_notes = _line(each, colour, start_time, spans)
