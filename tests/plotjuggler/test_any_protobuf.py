@@ -144,3 +144,12 @@ def test_maps_that_contain_their_own_type(name: str, plugin_files: dict[str, Pat
     prefix = {"Struct": "", "Value": "/struct_value", "ListValue": "/values[0]/struct_value"}[name]
     found = {pair.key: pair.value for pair in parser.parse(whole[name].SerializeToString()).pairs}
     assert found[f"{prefix}/fields/a/struct_value/fields/b/number_value"] == 1.5
+
+
+def test_the_first_message_may_be_empty(plugin_files: dict[str, Path]) -> None:
+    descriptor = struct_pb2.DESCRIPTOR.message_types_by_name["Value"]
+    plugin = open_plugin(plugin_files["protobuf"])
+    parser = plugin.parser("/any", descriptor.full_name, descriptor_set(descriptor))
+    found = parser.parse(b"")
+    assert found.refused is None
+    assert "/number_value" in {pair.key for pair in found.pairs}
