@@ -215,7 +215,7 @@ class Session(abc.ABC):
 
     def _input_room(self, size: int) -> int:
         address, room = self._input
-        if size > room:
+        if size > room or not address:  # a message without bytes has an address, too
             if room:
                 self._input = (0, 0)
                 self.free(address, room)

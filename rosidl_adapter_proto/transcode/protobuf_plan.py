@@ -139,7 +139,7 @@ class _Builder:
                     continue
                 index = 0
                 if (part := field.message_type) is not None:
-                    if path.count(part.full_name) >= MAXIMUM_RECURSION:
+                    if _stands_too_often(part, path):
                         continue
                     index, inner = self.add(part, path)
                     depth = max(depth, 1 + inner)
@@ -186,6 +186,13 @@ class _Builder:
 def _check_depth(name: str, depth: int) -> None:
     if depth > MAXIMUM_DEPTH:
         raise SchemaError(f"{name}: messages are nested more than {MAXIMUM_DEPTH} deep; flatten it")
+
+
+def _stands_too_often(part: Descriptor, path: tuple[str, ...]) -> bool:
+    """Tell whether a field with such a message is left out: a map is, if its values are."""
+    inner = part.fields if is_map_entry(part) else ()
+    parts = [part, *(field.message_type for field in inner if field.message_type is not None)]
+    return any(path.count(each.full_name) >= MAXIMUM_RECURSION for each in parts)
 
 
 def is_map_entry(descriptor: Descriptor) -> bool:

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, struct_pb2
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import Message
 
+from rosidl_adapter_proto.bags.descriptors import descriptor_set
 from rosidl_adapter_proto.plotjuggler.host import open_plugin
 from tests.plotjuggler.flattening import flatten_protobuf
 
@@ -126,3 +127,29 @@ def test_every_kind_of_field(syntax: str, plugin_files: dict[str, Path]) -> None
         assert found.refused is None
         pairs = [(pair.key, pair.kind.name, pair.value) for pair in found.pairs]
         assert sorted(map(repr, pairs)) == sorted(map(repr, expected))
+
+
+@pytest.mark.parametrize("name", ["Struct", "Value", "ListValue"])
+def test_maps_that_contain_their_own_type(name: str, plugin_files: dict[str, Path]) -> None:
+    descriptor = struct_pb2.DESCRIPTOR.message_types_by_name[name]
+    plugin = open_plugin(plugin_files["protobuf"])
+    parser = plugin.parser("/any", descriptor.full_name, descriptor_set(descriptor))
+    struct = struct_pb2.Struct()
+    struct.update({"a": {"b": 1.5}})
+    whole: dict[str, Message] = {
+        "Struct": struct,
+        "Value": struct_pb2.Value(struct_value=struct),
+        "ListValue": struct_pb2.ListValue(values=[struct_pb2.Value(struct_value=struct)]),
+    }
+    prefix = {"Struct": "", "Value": "/struct_value", "ListValue": "/values[0]/struct_value"}[name]
+    found = {pair.key: pair.value for pair in parser.parse(whole[name].SerializeToString()).pairs}
+    assert found[f"{prefix}/fields/a/struct_value/fields/b/number_value"] == 1.5
+
+
+def test_the_first_message_may_be_empty(plugin_files: dict[str, Path]) -> None:
+    descriptor = struct_pb2.DESCRIPTOR.message_types_by_name["Value"]
+    plugin = open_plugin(plugin_files["protobuf"])
+    parser = plugin.parser("/any", descriptor.full_name, descriptor_set(descriptor))
+    found = parser.parse(b"")
+    assert found.refused is None
+    assert "/number_value" in {pair.key for pair in found.pairs}

@@ -136,6 +136,7 @@ class Planner {
   const char* describe(uint32_t message, const DescribedField& described, PlannedField* field,
                        FlatNote* note);
   std::vector<uint32_t> key(uint32_t message) const;
+  bool stands_too_often(uint32_t message) const;
 
   const DescribedTypes& types_;
   const SchemaLimits limits_;
@@ -187,6 +188,16 @@ std::vector<uint32_t> Planner::key(uint32_t message) const {
   return key;
 }
 
+// Whether a field with such a message is left out: a map is, if its values are.
+bool Planner::stands_too_often(uint32_t message) const {
+  if (nodes_[message].standing >= kMaximumRecursion) return true;
+  const auto& fields = nodes_[message].fields;
+  return types_[message].is_map_entry &&
+         std::any_of(fields.begin(), fields.end(), [this](const DescribedField& each) {
+           return each.type == kMessageType && nodes_[each.part].standing >= kMaximumRecursion;
+         });
+}
+
 const char* Planner::add(uint32_t message, Place* place) {
   const size_t outer = path_.size();
   ++nodes_[message].standing;
@@ -212,7 +223,7 @@ const char* Planner::plan(uint32_t message, Place* place) {
   for (const DescribedField& each : nodes_[message].fields) {
     PlannedField field = planned_field(each);
     if (each.type == kMessageType) {
-      if (nodes_[each.part].standing >= kMaximumRecursion) continue;
+      if (stands_too_often(each.part)) continue;
       Place part;
       if (const char* wrong = add(each.part, &part)) return wrong;
       field.message = part.index;
