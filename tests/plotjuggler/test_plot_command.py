@@ -116,3 +116,13 @@ def test_what_has_to_be_installed(
     assert code == 2
     assert err.startswith(f"Error: {what} (")
     assert err.endswith("; pip install 'rosidl-adapter-proto[plot]'\n")
+
+
+def test_what_is_whole_of_a_bag_that_was_cut_off(run: Run, folder: Path) -> None:
+    bag = folder / "bag.mcap"
+    write_mcap(bag, record([IMU], 1))
+    bag.write_bytes(bag.read_bytes()[: bag.stat().st_size // 2])
+
+    code, out, err = run("-o", "x.png", "--salvage")
+    assert (code, out) == (1, "x.png: 3 series, 2100 values\n")
+    assert err.startswith("Warning: one message is odd\nWarning: bag.mcap: the recording was not finished")

@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
-from rosidl_adapter_proto.cli.options import bag_source_options, time_options
+from rosidl_adapter_proto.cli.options import bag_source_options, salvage_option, time_options
 from rosidl_adapter_proto.cli.series_options import require_plotjuggler
-from rosidl_adapter_proto.cli.texts import EXIT_INCOMPLETE, progress_bar, show_warnings
+from rosidl_adapter_proto.cli.texts import EXIT_INCOMPLETE, progress_bar, show_bag_warnings, show_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 _HEIGHT = 20  # lines; plotext draws no more than it takes a terminal to have
@@ -32,6 +32,7 @@ _HEIGHT = 20  # lines; plotext draws no more than it takes a terminal to have
 )
 @click.option("--title", help="What stands above the plot; by default the name of the bag.")
 @time_options
+@salvage_option
 @bag_source_options
 def command(
     bag: str,
@@ -40,6 +41,7 @@ def command(
     title: str | None,
     start: int | None,
     end: int | None,
+    salvage: bool,
     include: tuple[Path, ...],
     distro: str | None,
 ) -> int:
@@ -58,7 +60,7 @@ def command(
     from rosidl_adapter_proto.plotjuggler.series_names import SeriesNames
 
     width = shutil.get_terminal_size().columns
-    with open_bag(bag, include=include, distro=distro) as opened:
+    with open_bag(bag, include=include, distro=distro, salvage=salvage) as opened:
         topics = chosen_topics(opened, names=SeriesNames(fields))
         try:
             with progress_bar(sum(opened.topics[name].message_count for name in topics)) as progress:
@@ -75,5 +77,6 @@ def command(
             click.echo(terminal_plot(plot, width, _HEIGHT, is_coloured=sys.stdout.isatty()))
         else:
             click.echo(f"{output}: {len(plot.lines)} series, {plot.value_count} values")
-        show_warnings([*opened.warnings, *plot.warnings])
-    return EXIT_INCOMPLETE if plot.warnings else 0
+        show_warnings(plot.warnings)
+        status = show_bag_warnings(opened)
+    return EXIT_INCOMPLETE if plot.warnings else status
