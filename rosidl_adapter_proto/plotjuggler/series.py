@@ -120,7 +120,7 @@ def chosen_topics(
     named = [name for name in bag.topics if not patterns or is_named(name, patterns)]
     chosen = [name for name in named if names.may_be_of(name)]
     if named and not chosen:
-        raise RequestError(f"{bag.path}: no topic has such series; there are {', '.join(named)}")
+        raise RequestError(f"{bag.path}: {names.no_topic(named)}")
     parsed = [name for name in chosen if plugin is None or is_for(plugin, bag.topics[name])]
     if chosen and not parsed:
         found = sorted({each for name in chosen for each in encodings(bag.topics[name]) if each})

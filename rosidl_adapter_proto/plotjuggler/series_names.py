@@ -34,6 +34,13 @@ class SeriesNames:
         """Tell whether a topic can have one of the series."""
         return not self._patterns or any(_may_be_of(name, topic) for name in self._patterns)
 
+    def no_topic(self, topics: Iterable[str]) -> str:
+        """Return what to say when none of some topics can have one of the series."""
+        return (
+            f"no topic has {' or '.join(self._patterns)}; a name is a topic and what stands below it, such as "
+            f"/imu/orientation/x, and there are {', '.join(topics)}"
+        )
+
     def is_chosen(self, name: str) -> bool:
         """Tell whether a series is among the chosen ones."""
         chosen = [each for each, pattern in self._patterns.items() if pattern.fullmatch(name)]

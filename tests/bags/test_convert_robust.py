@@ -21,14 +21,18 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 ROOT = Path(__file__).parent.parent.parent
 WAITING = """
-import sys
+import os, select, signal, sys
 from rosidl_adapter_proto.bags import mcap_writer, output, sqlite3_writer
 from rosidl_adapter_proto.cli import main
 place, *arguments = sys.argv[1:]
+# A signal that comes before the program waits also ends its waiting.
+signalled, wakeup = os.pipe()
+os.set_blocking(wakeup, False)
+signal.set_wakeup_fd(wakeup)
 def waiting(function):
     def wait(*arguments):
         print("waiting", flush=True)
-        sys.stdin.read()
+        select.select([sys.stdin, signalled], [], [])
         return function(*arguments)
     return wait
 module, _, name = place.partition(":")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -140,3 +141,10 @@ def test_the_command(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert "  NO   refuses messages for no parser (self 0): byte 0: the number of pairs" in result.output
     assert result.output.endswith("echo.wasm meets none of them\n")
+
+
+def test_the_command_without_an_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "wasmtime", None)
+    result = CliRunner().invoke(program, ["plotjuggler", "check", "echo.wasm"], standalone_mode=False)
+    assert str(result.exception).startswith("running plugins needs wasmtime (")
+    assert str(result.exception).endswith("): pip install 'rosidl-adapter-proto[plotjuggler]'")

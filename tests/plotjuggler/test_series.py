@@ -243,9 +243,10 @@ def test_topics_of_which_nothing_is_known(tmp_path: Path) -> None:
     [
         ({"topics": ["/ima"]}, RequestError, "there is no topic /ima; did you mean /imu?"),
         (
-            {"fields": ["/gps"]},
+            {"fields": ["/gps", "imu/orientation"]},
             RequestError,
-            "no topic has such series; there are /imu, /joint_states, /scan, /tf",
+            "no topic has /gps or imu/orientation; a name is a topic and what stands below it, such as "
+            "/imu/orientation/x, and there are /imu, /joint_states, /scan, /tf",
         ),
         (
             {"fields": ["/imu/orientation/x", "/imu/orientation/v"]},

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rosidl_adapter_proto.cli.series_options import require_plotjuggler
+
 if TYPE_CHECKING:
     from rosidl_adapter_proto.plotjuggler.check import Report
 
@@ -22,6 +24,7 @@ def command(context: click.Context, plugin: Path) -> None:
 
     No messages are needed. The exit code is 0 if it meets at least one of them whole, else 1.
     """
+    require_plotjuggler()
     from rosidl_adapter_proto.plotjuggler.check import check_plugin
 
     reports = check_plugin(plugin)
