@@ -10,7 +10,7 @@ FUZZ_MUTATIONS ?= 200000
 FUZZ_SECONDS ?= 600
 
 .PHONY: demo environments test check check-black check-clang-format check-ruff check-mypy docs tidy \
-  test-core test-kilted test-jazzy test-colcon test-fuzz fuzz benchmark golden format clean
+  test-core test-kilted test-jazzy test-colcon test-fuzz fuzz plugins benchmark golden format clean
 
 # What only the tests need of ROS, and the oldest protobuf runtime that generated code runs on.
 KILTED_TEST_PACKAGES := ros-test-msgs ros-test-interface-files
@@ -52,7 +52,7 @@ test:
 	$(MAKE) --jobs=1 check docs test-core test-kilted test-jazzy test-colcon test-fuzz
 
 PYTHON_FOLDERS := rosidl_adapter_proto tests examples benchmarks core docs
-CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/src/*/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.?pp)
+CPP_FILES := $(wildcard core/include/*/*.hpp core/src/*.?pp core/src/*/*.?pp core/python/*.?pp core/test/*.?pp core/fuzz/*.?pp core/wasm/*.?pp)
 
 # The hooks of .pre-commit-config.yaml are these.
 check: check-black check-clang-format check-ruff check-mypy
@@ -116,11 +116,17 @@ fuzz: $(VENV)/ready
 	ROSIDL_PROTO_FUZZ_PLANS=build/fuzz-clang/corpus/plans.bin \
 	  build/fuzz-clang/core/fuzz/fuzz_transcode -max_total_time=$(FUZZ_SECONDS) build/fuzz-clang/corpus/inputs
 
+# The parser plugins of PlotJuggler, which wheels that are built afterwards bring.
+plugins: $(VENV)/ready
+	rm -rf rosidl_adapter_proto/plotjuggler/built
+	$(BIN)/python -c "from rosidl_adapter_proto.plotjuggler.plugins import build_shipped_plugins as build; build()"
+
 benchmark: $(VENV)/ready
 	$(BIN)/python benchmarks/generate.py
 	$(BIN)/python benchmarks/messages.py
 	$(BIN)/python benchmarks/bags.py
 	$(BIN)/python benchmarks/tables.py
+	$(BIN)/python benchmarks/plotjuggler.py
 
 golden: $(VENV)/ready
 	$(BIN)/python -m pytest tests/generate/test_golden.py tests/adapter/test_contract.py \

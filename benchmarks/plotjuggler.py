@@ -1,131 +1,124 @@
-"""What time series of messages cost: a parser plugin in our host, against protobuf or rosbags and Python.
+"""What parsing messages with plugins of PlotJuggler costs in the host, and series of a bag.
 
     python benchmarks/plotjuggler.py
 
-needs the environment of the tests. Every row is a ratio: its two sides are measured in one run, taking turns, and the
-fastest turn of each counts. All sides make a column of every number and text of the messages.
+needs `[plotjuggler]`. Every row has microseconds a message and a ratio: both sides are measured in one run, taking
+turns, and the fastest turn of each counts.
 """
 
 from __future__ import annotations
 
+import array
 import tempfile
-from array import array
-from collections.abc import Callable, Iterable
-from itertools import accumulate
+from collections.abc import Callable
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
 
-from bag_maker import IMU, JOINT_STATES, TF, Stream, record, typestore, write_mcap
+from bag_maker import IMU, JOINT_STATES, SCAN, TF, Stream, record, write_mcap
+from google.protobuf.descriptor import FieldDescriptor
 from timing import seconds
 
-from rosidl_adapter_proto.bags.bag import open_bag
-from rosidl_adapter_proto.bags.types import protobuf_definition
-from rosidl_adapter_proto.plotjuggler.host import Parser, open_plugin
-from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
-from rosidl_adapter_proto.transcode import Transcoder
+from rosidl_adapter_proto.bags.bag import Bag, open_bag
+from rosidl_adapter_proto.bags.convert import convert_bag
+from rosidl_adapter_proto.plotjuggler.host import ArrayPolicy
+from rosidl_adapter_proto.plotjuggler.series import read_series
+from rosidl_adapter_proto.plotjuggler.topic_parsers import TopicParsers
 
-COUNT = 10_000
-TURNS = 10
-MICROSECONDS = 3
-RATIO = 3
-
-
-def joined(messages: list[bytes]) -> tuple[bytes, array[int]]:
-    """Return messages as a batch has them."""
-    ends = list(accumulate(map(len, messages)))
-    return b"".join(messages), array(
-        "Q", [edge for pair in zip([0, *ends], ends, strict=False) for edge in pair]
-    )
+COUNT = 20_000
+BY_HAND = 1_000
+WANTED = {IMU: "<= 3 us, >= 3"}
+EVERYTHING = ArrayPolicy(clamp=True, maximum=10_000)
 
 
-def flatten_protobuf(messages: Iterable[Any]) -> dict[str, list[Any]]:
-    """Make columns of messages of protobuf, in Python."""
-    columns: dict[str, list[Any]] = {}
-
-    def add(key: str, value: Any) -> None:
-        if hasattr(value, "DESCRIPTOR"):
-            for field in value.DESCRIPTOR.fields:
-                add(f"{key}/{field.name}", getattr(value, field.name))
-        elif isinstance(value, (int, float, str)):
-            columns.setdefault(key, []).append(value)
-        else:
+def flatten(message: Any, prefix: str, pairs: list[tuple[str, Any]]) -> None:
+    """Flatten a protobuf message as one does in Python, without the types of values."""
+    for field in message.DESCRIPTOR.fields:
+        value, key = getattr(message, field.name), f"{prefix}/{field.name}"
+        is_message = field.type == FieldDescriptor.TYPE_MESSAGE
+        if not field.is_repeated:
+            if is_message:
+                flatten(value, key, pairs)
+            else:
+                pairs.append((key, value))
+        elif is_message:
             for index, each in enumerate(value):
-                add(f"{key}[{index}]", each)
-
-    for message in messages:
-        add("", message)
-    return columns
-
-
-def flatten_rosbags(messages: Iterable[Any]) -> dict[str, list[Any]]:
-    """Make columns of messages of rosbags, in Python."""
-    columns: dict[str, list[Any]] = {}
-
-    def add(key: str, value: Any) -> None:
-        if hasattr(value, "__msgtype__"):
-            for name in value.__dataclass_fields__:
-                if name != "__msgtype__":
-                    add(f"{key}/{name}", getattr(value, name))
-        elif isinstance(value, (int, float, str)):
-            columns.setdefault(key, []).append(value)
+                flatten(each, f"{key}[{index}]", pairs)
         else:
-            for index, each in enumerate(value.tolist() if hasattr(value, "tolist") else value):
-                add(f"{key}[{index}]", each)
-
-    for message in messages:
-        add("", message)
-    return columns
+            pairs.extend((f"{key}[{index}]", each) for index, each in enumerate(value))
 
 
-def in_host(parser: Parser, messages: list[bytes]) -> Callable[[], object]:
-    """Return what parses messages in a batch."""
-    data, ranges = joined(messages)
-    return lambda: parser.parse_batch(data, ranges)
+def by_hand(message_class: Any, messages: list[bytes]) -> None:
+    for data in messages:
+        flatten(message_class.FromString(data), "", [])
 
 
-def rows(folder: Path, stream: Stream) -> None:
+def batch_of(bag: Bag, topic: str) -> tuple[list[bytes], Callable[[], object]]:
+    """Return the messages of a topic, and what parses them in one batch."""
+    messages = [each.data for each in bag.messages(topic)]
+    parser = TopicParsers(bag.types, None, EVERYTHING).parser(bag.topics[topic])
+    ends = [0, *accumulate(map(len, messages))]
+    ranges = array.array("Q", [place for pair in pairwise(ends) for place in pair])
+    data, places = memoryview(b"".join(messages)), _numbers(ranges)
+    return messages, lambda: parser.parse(data, places)
+
+
+def _numbers(ranges: array.array[int]) -> Any:
+    import numpy
+
+    return numpy.frombuffer(ranges, numpy.uint64).reshape(-1, 2)
+
+
+def rows(folder: Path, stream: Stream, count: int) -> None:
     """Measure one type, and print its rows."""
-    path = folder / f"{stream.topic[1:]}.mcap"
-    recorded = list(record([stream], COUNT / stream.rate))
-    write_mcap(path, recorded)
-    cdr = [each.data for each in recorded]
-    with open_bag(path) as bag:
-        schema = bag.schema(stream.topic)
-        text = bag.topics[stream.topic].definition.data
-    protobuf = list(
-        map(bytes, Transcoder(schema.type_description, schema.descriptor).cdr_to_proto_batch(cdr))
+    path, converted = folder / "cdr.mcap", folder / "protobuf.mcap"
+    write_mcap(path, record([stream], count / stream.rate))
+    convert_bag(path, converted, target_format="protobuf")
+    cdr, protobuf = open_bag(path), open_bag(converted)
+    _, from_cdr = batch_of(cdr, stream.topic)
+    messages, from_protobuf = batch_of(protobuf, stream.topic)
+    message_class = protobuf.schema(stream.topic).message_class
+    few = messages[:BY_HAND]
+    ours_cdr, ours_protobuf, python = seconds(
+        from_cdr, from_protobuf, lambda: by_hand(message_class, few), turns=10
     )
-    message_class = schema.message_class
-    store = typestore()
-    ros2msg = open_plugin(plugin_path("ros2msg")).parser(stream.topic, stream.type_name, text)
-    flat = open_plugin(plugin_path("protobuf")).parser(
-        stream.topic, schema.descriptor.full_name, protobuf_definition(schema).data
-    )
-    from_cdr, from_protobuf, python_cdr, python_protobuf = seconds(
-        in_host(ros2msg, cdr),
-        in_host(flat, protobuf),
-        lambda: flatten_rosbags(store.deserialize_cdr(each, stream.type_name) for each in cdr),
-        lambda: flatten_protobuf(map(message_class.FromString, protobuf)),
-        turns=TURNS,
-    )
-    name = stream.type_name.rpartition("/")[2]
-    wanted = (MICROSECONDS, RATIO) if stream is IMU else ("", "")
-    show(f"{name}, CDR", "rosbags, flattened in Python", from_cdr, python_cdr, *wanted)
-    show(f"{name}, protobuf", "protobuf, flattened in Python", from_protobuf, python_protobuf, *wanted)
+    name, wanted = stream.type_name.rpartition("/")[2], WANTED.get(stream, "")
+    theirs = python / len(few)
+    show(f"{name}, protobuf.wasm, in batches", ours_protobuf / count, theirs, wanted)
+    show(f"{name}, ros2msg.wasm, in batches", ours_cdr / count, theirs, wanted)
+    path.unlink()
+    converted.unlink()
 
 
-def show(work: str, against: str, ours: float, theirs: float, most: object, least: object) -> None:
-    wanted = f"<= {most} us, >= {least}" if most else ""
-    times = f"{ours / COUNT * 1e6:8.2f} {theirs / COUNT * 1e6:8.2f}"
-    print(f"{work:24} {against:32} {times} {theirs / ours:7.1f}  {wanted}", flush=True)
+def bag_rows(folder: Path) -> None:
+    """Measure the series of a whole bag, and print its row."""
+    path = folder / "bag.mcap"
+    streams, length = (IMU, JOINT_STATES, TF), 300
+    messages = list(record(streams, length))
+    write_mcap(path, messages, compression="zstd")
+    bag = open_bag(path)
+
+    def python() -> None:
+        for each in bag.messages():
+            flatten(each.message, "", [])
+
+    ours, theirs = seconds(lambda: read_series(bag), python, turns=3)
+    show("series of a bag: Imu, JointState, TF", ours / len(messages), theirs / len(messages), "")
+
+
+def show(work: str, ours: float, theirs: float, wanted: str) -> None:
+    times = f"{ours * 1e6:9.2f} us {theirs * 1e6:9.2f} us"
+    print(f"{work:40} {times} {theirs / ours:7.1f}  {wanted}", flush=True)
 
 
 def main() -> None:
     """Measure, and print the table."""
-    print(f"{'work':24} {'against':32} {'us':>8} {'against':>8} {'ratio':>7}  wanted")
+    print(f"{'work':40} {'a message':>12} {'in Python':>12} {'ratio':>7}  wanted")
     with tempfile.TemporaryDirectory() as folder:
-        for stream in (IMU, JOINT_STATES, TF):
-            rows(Path(folder), stream)
+        rows(Path(folder), IMU, COUNT)
+        rows(Path(folder), TF, COUNT // 4)
+        rows(Path(folder), SCAN, COUNT // 20)
+        bag_rows(Path(folder))
 
 
 if __name__ == "__main__":

@@ -38,8 +38,8 @@ def with_links(text: str, folder: Path) -> str:
         if target in TOP.values():
             return found[0]
         path = (folder / target).resolve().relative_to(ROOT)
-        if path.parent == Path("docs"):
-            return f"[{label}]({path.name}{anchor})"
+        if path.is_relative_to("docs"):
+            return f"[{label}]({path.relative_to('docs')}{anchor})"
         return f"[{label}]({TOP[str(path)]}{anchor})" if str(path) in TOP else label
 
     return LINK.sub(change, text)

@@ -19,6 +19,7 @@ DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TOP = [ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 ONE_PROGRAM = "rclpy.md"  # its blocks are one program, which tests/ros runs
 BUILDS = ("build-colcon.md", "build-setuptools.md", "build-hatch.md")  # tests/hooks runs them
+PLOTS = ("plots.md", "plotjuggler.md")  # tests/plotjuggler runs them
 FRAMES = ("ray-data.md", "daft.md")  # tests/bags/peers runs them
 PEERS = {"import polars": "polars", "to_pandas": "pandas", "from mcap_protobuf": "mcap_protobuf"}
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -60,6 +61,8 @@ def test_blocks_run(document: Path, installed: Path, recording: Path, tmp_path: 
         pytest.skip("run by tests/ros/test_programs.py")
     if document.name in BUILDS:
         pytest.skip("run by tests/hooks")
+    if document.name in PLOTS:
+        pytest.skip("run by tests/plotjuggler/test_plots_page.py")
     if document.name in FRAMES:
         pytest.skip("run by tests/bags/peers")
     shutil.copytree(recording, tmp_path / "recording")

@@ -11,7 +11,7 @@ namespace {
 class CdrSize : public Stop {
  public:
   using At = uint64_t;
-  static constexpr bool kSizesOnly = true, kPlaces = false, kAllFields = true;
+  static constexpr bool kSizesOnly = true, kPlaces = false, kMakesCdr = true;
 
   struct Nested {
     At at;
@@ -80,7 +80,7 @@ class CdrSize : public Stop {
 class CdrWriter : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = true, kAllFields = true;
+  static constexpr bool kSizesOnly = false, kPlaces = true, kMakesCdr = true;
 
   struct Nested {
     At at;

@@ -31,7 +31,7 @@ ROSIDL_PROTO_NO_INLINE inline Reason grow(Memory& memory, uint64_t size, ColumnR
 class ColumnSink : public Stop {
  public:
   using At = Column*;
-  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false;
 
   struct Nested {
     At at;

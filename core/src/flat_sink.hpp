@@ -71,7 +71,7 @@ class IndexText {
 class FlatSink : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false, kAnyText = true;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false, kAnyText = true;
 
   // What there was outside of a submessage.
   struct Nested {

@@ -195,7 +195,7 @@ class ProtobufReader {
     const Operation* const last = plan_.end(message);
     Slot* const free = slots + message.count;
     for (const Operation* op = plan_.begin(message); op != last; ++op) {
-      if (!Sink::kAllFields && op->reading == Reading::Skip) continue;
+      if (!Sink::kMakesCdr && op->reading == Reading::Skip) continue;
       const ProtobufField field{message, *op, slots[op - plan_.begin(message)], range.end};
       at = op->shape == Shape::Single ? one(field, free, at) : many(field, free, at);
       if (Sink::failed(at)) return input_.leave(*op), at;
@@ -351,7 +351,8 @@ class ProtobufReader {
     if (!is_utf8(text.data, text.size)) return input_.fail(Reason::Utf8, text.data);
     // CORBA 3.3 part 2, section 9.3.2.7: the only NUL is the last byte. rclpy and rclc read no further than
     // the first.
-    return text.size == 0 || std::memchr(text.data, 0, static_cast<size_t>(text.size)) == nullptr ||
+    return !Sink::kMakesCdr || text.size == 0 ||
+           std::memchr(text.data, 0, static_cast<size_t>(text.size)) == nullptr ||
            input_.fail(Reason::NulInString, text.data);
   }
 

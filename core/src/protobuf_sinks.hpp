@@ -40,7 +40,7 @@ constexpr uint64_t kElementSize = F::kCopiesToProtobuf                ? F::kSize
 class ProtobufSize : public Stop {
  public:
   using At = uint64_t;
-  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false;
 
   struct Nested {
     At at;
@@ -131,7 +131,7 @@ template <bool kMeasured>
 class ProtobufOutput : public Stop {
  public:
   using At = uint8_t*;
-  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false;
 
   struct Nested {
     At at;

@@ -9,10 +9,9 @@
 //                 `within_limit`, as `CdrSize` does
 //   kPlaces       the fields of a message of fixed size can be written in any order; then it has `zeros` and
 //                 `position`, as `CdrWriter` does
-//   kAllFields    it wants zeros for fields that protobuf does not have
-//   kAnyText      it takes strings that are no UTF-8 or have a NUL inside, which else are errors; only sinks
-//   that
-//                 do say so
+//   kMakesCdr     it makes CDR: it wants zeros for fields that protobuf does not have, and no string with NUL
+//                 inside
+//   kAnyText      it takes strings that are no UTF-8, which else are errors; only sinks that do say so
 //
 // and what a reader calls, each of which returns where it goes on:
 //

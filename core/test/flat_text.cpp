@@ -12,7 +12,7 @@ namespace {
 class FlatText : public Stop {
  public:
   using At = bool;  // everything is kept in the sink
-  static constexpr bool kSizesOnly = false, kPlaces = false, kAllFields = false;
+  static constexpr bool kSizesOnly = false, kPlaces = false, kMakesCdr = false;
 
   struct Nested {
     At at;

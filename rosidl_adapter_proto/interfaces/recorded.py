@@ -14,8 +14,14 @@ from typing import NamedTuple
 
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.catalog import interface_base
+from rosidl_adapter_proto.interfaces.description import (
+    FieldDescription,
+    IndividualTypeDescription,
+    TypeDescription,
+    described_type,
+)
 from rosidl_adapter_proto.interfaces.find import Definition, Package, Source
-from rosidl_adapter_proto.interfaces.model import NAMESPACES, TypeName
+from rosidl_adapter_proto.interfaces.model import EMPTY_STRUCT_FIELD, NAMESPACES, Shape, TypeName
 from rosidl_adapter_proto.interfaces.msg import RECORDED, RECORDED_WITH_HEADER, ROS1, SEPARATOR, Dialect
 
 ROS2MSG = "ros2msg"
@@ -136,6 +142,63 @@ def recorded_text(definitions: Mapping[TypeName, Definition]) -> tuple[str, byte
             texts.append(f"{'=' * 80}\n{_KINDS[each.format]}: {_written(name, encoding)}\n")
         texts.append(_tidy(each.text.replace("\r\n", "\n")))
     return encoding, "".join(texts).encode()
+
+
+def described_text(description: TypeDescription) -> bytes:
+    """Return the text that `ros2msg` recordings have of a type, whatever it was defined in: fields, and nothing else.
+
+    The `char` and `wchar` of IDL, which `.msg` does not have, are the numbers that they are in CDR, and parts of
+    services and actions in other messages are messages of the same names.
+
+    Args:
+        description: The type and all that it refers to.
+
+    Raises:
+        DefinitionError: It has a `long double`, which no `.msg` can say.
+    """
+    top = description["type_description"]
+    name = top["type_name"]
+    texts = [_described_fields(top)]
+    if (
+        not texts[0] and TypeName.parse(name).namespace != "msg"
+    ):  # else nothing would be taken for no definition
+        texts.insert(0, f"{'=' * 80}\nMSG: {name}\n")
+    for each in description["referenced_type_descriptions"]:
+        texts.append(f"{'=' * 80}\nMSG: {_described_name(each['type_name'])}\n{_described_fields(each)}")
+    return "".join(texts).encode()
+
+
+def _described_name(name: str) -> str:
+    package, _, last = name.split("/")
+    return f"{package}/{last}"
+
+
+_NUMBERS_OF_CHARACTERS = {"char": "uint8", "wchar": "uint16"}
+
+
+def _described_fields(description: IndividualTypeDescription) -> str:
+    name = description["type_name"]
+    fields = (each for each in description["fields"] if each["name"] != EMPTY_STRUCT_FIELD)
+    return "".join(f"{_described_field_type(name, each)} {each['name']}\n" for each in fields)
+
+
+def _described_field_type(type_name: str, field: FieldDescription) -> str:
+    shape, element, capacity, string_bound = described_type(field["type"])
+    if isinstance(element, TypeName):
+        text = _described_name(str(element))
+    elif element.msg:
+        text = element.msg[0]
+    elif element.name in _NUMBERS_OF_CHARACTERS:
+        text = _NUMBERS_OF_CHARACTERS[element.name]
+    else:
+        raise DefinitionError(f"{type_name}.{field['name']}: no .msg definition can have a {element.name}")
+    bound = "" if string_bound is None else f"<={string_bound}"
+    brackets = {
+        Shape.SINGLE: "",
+        Shape.ARRAY: f"[{capacity}]",
+        Shape.SEQUENCE: "[]" if capacity is None else f"[<={capacity}]",
+    }
+    return text + bound + brackets[shape]
 
 
 def _written(name: TypeName, encoding: str) -> str:

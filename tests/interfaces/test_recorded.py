@@ -13,11 +13,24 @@ from hypothesis import strategies as st
 from rosidl_adapter_proto.errors import DefinitionError
 from rosidl_adapter_proto.interfaces.catalog import Catalog
 from rosidl_adapter_proto.interfaces.closure import type_closure
+from rosidl_adapter_proto.interfaces.description import describe, individual_description
 from rosidl_adapter_proto.interfaces.find import prefix_sources, store_source
-from rosidl_adapter_proto.interfaces.model import BasicType, Message, TypeName, references, value_type
+from rosidl_adapter_proto.interfaces.model import (
+    ArrayType,
+    BasicType,
+    Field,
+    FieldType,
+    Message,
+    SequenceType,
+    StringType,
+    TypeName,
+    references,
+    value_type,
+)
 from rosidl_adapter_proto.interfaces.recorded import (
     MAXIMUM_DEFINITIONS,
     MAXIMUM_SIZE,
+    described_text,
     recorded_definitions,
     recorded_source,
     recorded_text,
@@ -435,3 +448,47 @@ def test_written_again(text: str, type_name: str, encoding: str) -> None:
     again = recorded_definitions(written, encoding, type_name, "a.mcap")
     assert list(again.values()) == list(definitions.values())
     assert recorded_text(again) == (encoding, written)
+
+
+def test_every_embedded_message_is_written_of_its_description() -> None:
+    embedded = Catalog((store_source(),))
+    names = [name for package in embedded.packages for name in embedded.package(package)]
+    assert len(names) > 150
+    for name in names:
+        text = described_text(embedded.describe(name)).decode()
+        assert hash_of(text, str(name)) == embedded.hash(name), name
+
+
+@pytest.mark.parametrize(
+    ("field_type", "text"),
+    [
+        (StringType(bound=10), "string<=10"),
+        (SequenceType(StringType(wide=True, bound=10), 5), "wstring<=10[<=5]"),
+        (ArrayType(BasicType("boolean"), 3), "bool[3]"),
+        (BasicType("octet"), "byte"),
+        (SequenceType(BasicType("char")), "uint8[]"),
+        (BasicType("wchar"), "uint16"),
+        (TypeName("test_msgs", "srv", "Empty_Request"), "test_msgs/Empty_Request"),
+    ],
+)
+def test_types_of_described_fields(field_type: FieldType, text: str) -> None:
+    name = TypeName("my_msgs", "msg", "Track")
+    description = individual_description(Message(name, (Field("a", field_type), Field("b", field_type))))
+    whole = described_text({"type_description": description, "referenced_type_descriptions": []})
+    assert whole.decode() == f"{text} a\n{text} b\n"
+
+
+def test_the_description_of_a_request_without_fields_has_a_name() -> None:
+    name = TypeName("std_srvs", "srv", "Trigger_Request")
+    fields = (Field("structure_needs_at_least_one_member", BasicType("uint8")),)
+    text = described_text(describe(name, {name: Message(name, fields)}.__getitem__))
+    assert text.decode() == f"{RULE}\nMSG: std_srvs/srv/Trigger_Request\n"
+
+
+def test_a_described_long_double_is_no_msg() -> None:
+    name = TypeName("my_msgs", "msg", "Track")
+    message = Message(name, (Field("a", ArrayType(BasicType("long double"), 2)),))
+    with pytest.raises(
+        DefinitionError, match=r"^my_msgs/msg/Track\.a: no \.msg definition can have a long double$"
+    ):
+        described_text(describe(name, {name: message}.__getitem__))

@@ -298,6 +298,15 @@ def test_invalid_text() -> None:
     )
 
 
+def test_text_with_nul_inside() -> None:
+    schema = schema_of(STRING, "test/msg/String")
+    proto = schema.message_class(data="a\0b").SerializeToString()
+    for form, message in (("cdr", string("a-b").replace(b"-", b"\0")), ("protobuf", proto)):
+        reader = ColumnReader(schema, serialization_format=form)
+        reader.append([message])
+        assert rows_of(reader.record_batch()) == [{"data": "a\0b"}]
+
+
 def test_half_of_a_surrogate_pair() -> None:
     types = struct_type("test/msg/W", data="wstring[]")
     schema = schema_of(types, "test/msg/W")

@@ -69,6 +69,7 @@ class Flattener {
   const char* load(Plan plan, FlatNotes notes, FlatFormat format) noexcept;
 
   void set_array_policy(ArrayPolicy policy) noexcept { policy_ = policy; }
+  void set_format(FlatFormat format) noexcept { format_ = format; }
 
   // Writes the pairs of a message and returns how many bytes these are; 0 and an error if the message is not
   // valid, or if there is no room for the count. Pairs that do not fit are left out, and so are all that

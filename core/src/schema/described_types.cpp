@@ -263,7 +263,7 @@ const char* DescribedTypes::read_values(uint32_t index, size_t most, std::vector
   std::vector<Value> found;
   for (WireFields each(types_[index].content); each.next();) {
     if (each.tag != delimited(2)) continue;
-    if (found.size() == most) return "the enums of the type have more than 100000 values";
+    if (found.size() == most) return kTooManyValues;
     Value value{0, found.size(), {}};
     WireFields parts(each.bytes);
     while (parts.next()) {

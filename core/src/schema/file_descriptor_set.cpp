@@ -12,7 +12,6 @@ namespace {
 
 // The rules are those of transcode/protobuf_plan.py, which tells more about them.
 constexpr uint32_t kMaximumRecursion = 4;
-constexpr size_t kMaximumEnumValues = 100'000;
 constexpr const char* kTooDeep = "messages are nested more than 100 deep";
 
 // What a field is by nature, for each FieldDescriptorProto.Type: its form in CDR, and the type id of its
@@ -103,7 +102,8 @@ class Planner {
     uint32_t index = 0, height = 0;
   };
 
-  explicit Planner(const DescribedTypes& types) : types_(types), nodes_(types.size()) {}
+  Planner(const DescribedTypes& types, const SchemaLimits& limits)
+      : types_(types), limits_(limits), nodes_(types.size()) {}
 
   const char* run(uint32_t message) {
     Place place;
@@ -138,6 +138,7 @@ class Planner {
   std::vector<uint32_t> key(uint32_t message) const;
 
   const DescribedTypes& types_;
+  const SchemaLimits limits_;
   std::vector<Node> nodes_;                       // one for each type
   std::vector<uint32_t> open_;                    // reached, and of no circle yet
   std::vector<uint32_t> path_;                    // the way down
@@ -156,7 +157,7 @@ const char* Planner::find_circles(uint32_t message, uint32_t depth) {
   Node& node = nodes_[message];
   node.order = node.lowest = ++reached_;
   open_.push_back(message);
-  if (const char* wrong = types_.read_fields(message, kMaximumOperations - fields_, &node.fields))
+  if (const char* wrong = types_.read_fields(message, limits_.operations - fields_, &node.fields))
     return wrong;
   fields_ += node.fields.size();
   for (const DescribedField& each : node.fields) {
@@ -217,14 +218,14 @@ const char* Planner::plan(uint32_t message, Place* place) {
       field.message = part.index;
       height = std::max(height, part.height + 1);
     }
-    if (++operations_ > kMaximumOperations) return kTooManyFields;
+    if (++operations_ > limits_.operations) return kTooManyFields;
     FlatNote note;
     if (const char* wrong = describe(message, each, &field, &note)) return wrong;
     planned.fields.push_back(field);
     notes.push_back(std::move(note));
   }
   if (planned.fields.empty()) {
-    if (++operations_ > kMaximumOperations) return kTooManyFields;
+    if (++operations_ > limits_.operations) return kTooManyFields;
     planned.fields.push_back(filler());
     notes.emplace_back();
   }
@@ -241,7 +242,7 @@ const char* Planner::describe(uint32_t message, const DescribedField& described,
   if (described.type == kEnumType) {
     size_t count = 0;
     const char* const wrong =
-        types_.read_values(described.part, kMaximumEnumValues - enum_values_, &note->enum_values, &count);
+        types_.read_values(described.part, limits_.enum_values - enum_values_, &note->enum_values, &count);
     enum_values_ += count;
     anything_to_say_ = anything_to_say_ || !note->enum_values.empty();
     return wrong;
@@ -258,13 +259,14 @@ const char* Planner::describe(uint32_t message, const DescribedField& described,
   return nullptr;
 }
 
-const char* read(Slice set, std::string_view type_name, std::vector<uint8_t>* packed_plan, FlatNotes* notes) {
+const char* read(Slice set, std::string_view type_name, std::vector<uint8_t>* packed_plan, FlatNotes* notes,
+                 const SchemaLimits& limits) {
   if (set.size > kMaximumSchemaSize) return "the descriptor set has more than 4194304 bytes";
   DescribedTypes types;
   if (const char* wrong = types.read(set)) return wrong;
   uint32_t message;
   if (!types.find_message(type_name, &message)) return "the descriptor set does not have the message";
-  Planner planner(types);
+  Planner planner(types, limits);
   if (const char* wrong = planner.run(message)) return wrong;
   *packed_plan = planner.packed();
   *notes = planner.notes();
@@ -274,9 +276,10 @@ const char* read(Slice set, std::string_view type_name, std::vector<uint8_t>* pa
 }  // namespace
 
 const char* read_file_descriptor_set(const uint8_t* data, size_t size, std::string_view type_name,
-                                     std::vector<uint8_t>* packed_plan, FlatNotes* notes) noexcept {
+                                     std::vector<uint8_t>* packed_plan, FlatNotes* notes,
+                                     const SchemaLimits& limits) noexcept {
   try {
-    return read({data, size}, type_name, packed_plan, notes);
+    return read({data, size}, type_name, packed_plan, notes, limits);
   } catch (const std::exception&) {
     return "there is not enough memory for the descriptor set";
   }

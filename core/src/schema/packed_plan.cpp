@@ -5,6 +5,10 @@
 #include "rosidl_adapter_proto/wire.hpp"
 
 namespace rosidl_proto {
+
+const char* const kTooManyFields = "the type has more than 20000 fields, those of the types in it included";
+const char* const kTooManyValues = "the enums of the type have more than 100000 values";
+
 namespace {
 
 // All names of a plan, each of them once.

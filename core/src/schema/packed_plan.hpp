@@ -7,14 +7,12 @@
 #include <string_view>
 #include <vector>
 
-#include "rosidl_adapter_proto/plan.hpp"
+#include "rosidl_adapter_proto/schema.hpp"
 
 namespace rosidl_proto {
 
 // The most fields that the plan of a schema may have, those of all its messages together.
-constexpr uint32_t kMaximumOperations = 20'000;
-constexpr const char* kTooManyFields =
-    "the type has more than 20000 fields, those of the types in it included";
+constexpr uint32_t kMaximumOperations = SchemaLimits{}.operations;
 
 // The field that ROS gives to a message without fields.
 constexpr std::string_view kFiller = "structure_needs_at_least_one_member";

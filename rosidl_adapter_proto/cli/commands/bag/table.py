@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
@@ -16,7 +13,7 @@ from rosidl_adapter_proto.cli.options import (
     salvage_option,
     time_options,
 )
-from rosidl_adapter_proto.cli.texts import show_bag_warnings
+from rosidl_adapter_proto.cli.texts import progress_bar, show_bag_warnings
 from rosidl_adapter_proto.errors import RequestError
 
 
@@ -61,7 +58,7 @@ def command(
         raise RequestError("a table cannot go to the standard output; name a file")
     with open_bag(bag, include=include, distro=distro, salvage=salvage) as opened:
         found = opened.topics.get(topic)
-        with _progress_bar(found.message_count if found else 0) as progress:
+        with progress_bar(found.message_count if found else 0) as progress:
             rows = write_table(
                 opened,
                 topic,
@@ -75,13 +72,3 @@ def command(
         status = show_bag_warnings(opened)
     click.echo(f"{output}: {rows} rows")
     return status
-
-
-@contextmanager
-def _progress_bar(length: int) -> Iterator[Callable[[int], None] | None]:
-    """Show how far the work is, on a terminal; yield what to tell it."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    with click.progressbar(length=length, file=sys.stderr) as bar:
-        yield bar.update
