@@ -486,6 +486,17 @@ TEST(any_bytes_are_text) {
                   "\xef\xbf\xbdy INT64 0\n/small INT8 0\n/wide STRING \n");
 }
 
+TEST(text_may_have_nul_inside_where_no_cdr_is_made) {
+  const Plan plan = plan_of(CdrForm::String);
+  const Bytes proto = {0x0a, 3, 'a', 0, 'b'};
+  Flattener made = flattener(plan, FlatFormat::Released);
+  const Bytes pairs = flatten(made, Serialization::Protobuf, proto);
+  CHECK(pairs.size() > 3 && Bytes(pairs.end() - 3, pairs.end()) == (Bytes{'a', 0, 'b'}));
+  std::string error;
+  to_cdr(plan, proto, &error);
+  CHECK(error.find("the string contains NUL, which ends a string in ROS; remove it") != std::string::npos);
+}
+
 TEST(messages_that_are_not_valid_have_no_pairs) {
   for (const FlatFormat format : kFormats) {
     Flattener made = flattener(golden_plan("every_form"), format);
