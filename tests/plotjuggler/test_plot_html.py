@@ -157,10 +157,11 @@ def test_dragging_zooms(page: Page) -> None:
     page.wait_for("plot._fullLayout.xaxis.range[0] < 1")
 
 
-def test_the_mouse_shows_time_and_values(page: Page) -> None:
+# In a page of its own, since what the mouse has done there before may still be shown.
+def test_the_mouse_shows_time_and_values(browser: Any, tmp_path: Path) -> None:
+    page = Page(browser, plot(*three()), tmp_path)
     page.page.mouse.move(*page.place(0.3, 0.5))
-    shown = page.page.locator(".hoverlayer .legend")
-    shown.wait_for()
+    page.page.locator(".hoverlayer .legend").wait_for()
 
     assert page.texts(".hoverlayer .legendtitletext") == ["3.000000 s"]
     height, across = 9.81 + 0.3 * numpy.sin(9), 3 * numpy.cos(3)
@@ -169,7 +170,7 @@ def test_the_mouse_shows_time_and_values(page: Page) -> None:
         f"/imu/linear_acceleration/x : \N{MINUS SIGN}{-across:.8f}",
         "/battery/charging : 1",
     ]
-    page.page.mouse.move(0, 0)
+    page.page.context.close()
 
 
 def test_many_values_are_thinned_and_the_page_says_so(browser: Any, tmp_path: Path) -> None:
