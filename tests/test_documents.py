@@ -21,7 +21,12 @@ ONE_PROGRAM = "rclpy.md"  # its blocks are one program, which tests/ros runs
 BUILDS = ("build-colcon.md", "build-setuptools.md", "build-hatch.md")  # tests/hooks runs them
 PLOTS = ("plots.md", "plotjuggler.md")  # tests/plotjuggler runs them
 FRAMES = ("ray-data.md", "daft.md")  # tests/bags/peers runs them
-PEERS = {"import polars": "polars", "to_pandas": "pandas", "from mcap_protobuf": "mcap_protobuf"}
+PEERS = {
+    "import polars": "polars",
+    "to_pandas": "pandas",
+    "from mcap_protobuf": "mcap_protobuf",
+    "rosidl-proto plotjuggler": "wasmtime",
+}
 BLOCK = re.compile(r"^```(sh|python)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 NEEDS_ROS = re.compile(r"convert_to_ros_message\(\w+\)  #|import rclpy|^rosidl generate", re.MULTILINE)
 
@@ -47,7 +52,8 @@ def run(folder: Path, installed: Path, kind: str, text: str) -> None:
     text = re.sub(r"^pip install \./generated$", "", text, flags=re.MULTILINE)
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     python_path = os.pathsep.join([str(installed / "generated/python"), str(ROOT)])
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": python_path}
+    data = {"XDG_DATA_HOME": str(folder / "data")}  # where programs keep what is a user's
+    environment = {**os.environ, **data, "PATH": path, "PYTHONPATH": python_path}
     command = ["bash", "-euc", text] if kind == "sh" else [sys.executable, "-c", text]
     process = subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, check=False, text=True
