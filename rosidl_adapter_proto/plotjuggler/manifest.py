@@ -230,18 +230,14 @@ def _line_edit(entry: _Members) -> LineEdit:
     )
 
 
-def _spin_box_int(entry: _Members) -> SpinBoxInt:
-    default, limits = entry.number_and_range(_integer)
-    return SpinBoxInt(
-        entry.text("ID"), entry.text("label"), default, entry.optional_text("description"), limits
-    )
+def _spin_box(widget: Callable[..., Widget], read: Callable[[str], Any]) -> Callable[[_Members], Widget]:
+    def spin_box(entry: _Members) -> Widget:
+        default, limits = entry.number_and_range(read)
+        return widget(
+            entry.text("ID"), entry.text("label"), default, entry.optional_text("description"), limits
+        )
 
-
-def _spin_box_double(entry: _Members) -> SpinBoxDouble:
-    default, limits = entry.number_and_range(_double)
-    return SpinBoxDouble(
-        entry.text("ID"), entry.text("label"), default, entry.optional_text("description"), limits
-    )
+    return spin_box
 
 
 def _check_box(entry: _Members) -> CheckBox:
@@ -266,14 +262,6 @@ def _combo_box(entry: _Members) -> ComboBox:
     )
 
 
-_WIDGETS: dict[str, Callable[[_Members], Widget]] = {
-    "Label": _label,
-    "LineEdit": _line_edit,
-    "SpinBoxInt": _spin_box_int,
-    "SpinBoxDouble": _spin_box_double,
-    "CheckBox": _check_box,
-    "ComboBox": _combo_box,
-}
 _BOOLS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 
 
@@ -288,6 +276,16 @@ def _double(text: str) -> float:
     if not re.fullmatch(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?", text):
         raise ValueError("no number")
     return float(text)
+
+
+_WIDGETS: dict[str, Callable[[_Members], Widget]] = {
+    "Label": _label,
+    "LineEdit": _line_edit,
+    "SpinBoxInt": _spin_box(SpinBoxInt, _integer),
+    "SpinBoxDouble": _spin_box(SpinBoxDouble, _double),
+    "CheckBox": _check_box,
+    "ComboBox": _combo_box,
+}
 
 
 class _Members:

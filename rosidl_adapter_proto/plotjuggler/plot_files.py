@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable
-from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rosidl_adapter_proto.bags.bag import Bag
 from rosidl_adapter_proto.bags.output import check_new, written_aside
@@ -16,8 +15,6 @@ from rosidl_adapter_proto.plotjuggler.plot import Plot, read_plot
 
 if TYPE_CHECKING:
     from rosidl_adapter_proto.time import Time
-
-_FORMATS = {".png": "png", ".html": "html"}
 
 
 def write_plot(
@@ -61,11 +58,13 @@ def write_plot(
 
 def _writer(path: Place) -> Callable[[Plot, Path], None]:
     """Return what writes a file, by its suffix; only that is imported."""
-    found = _FORMATS.get(path.suffix.lower())
-    if found is None:
-        raise RequestError(
-            f"{path}: the suffix says no format of plots; name the file {' or '.join(_FORMATS)}"
-        )
-    module: Any = import_module(f"rosidl_adapter_proto.plotjuggler.plot_{found}")
-    writer: Callable[[Plot, Path], None] = getattr(module, f"write_{found}")
-    return writer
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        from rosidl_adapter_proto.plotjuggler.plot_png import write_png
+
+        return write_png
+    if suffix == ".html":
+        from rosidl_adapter_proto.plotjuggler.plot_html import write_html
+
+        return write_html
+    raise RequestError(f"{path}: the suffix says no format of plots; name the file .png or .html")

@@ -46,9 +46,9 @@ def parser_input(topic: Topic, types: BagTypes) -> ParserInput:
     Raises:
         BagError: Nothing is known of its type, or no parser could be told of it.
     """
-    makers = {CDR: _of_cdr, PROTOBUF: _of_protobuf, ROS1: _of_ros1}
-    if topic.serialization_format in makers:
-        return makers[topic.serialization_format](topic, types)
+    known = _FORMATS.get(topic.serialization_format)
+    if known is not None:
+        return known[1](topic, types)
     type_name = topic.schema_name or topic.type_name
     return ParserInput(topic.serialization_format, type_name, topic.definition.data)
 
@@ -78,6 +78,14 @@ def _of_ros1(topic: Topic, types: BagTypes) -> ParserInput:
     return ParserInput(
         PROTOBUF, schema.descriptor.full_name, protobuf_definition(schema).data, transcoder.ros1_to_proto
     )
+
+
+# What plugins call the encoding of messages of a format, and what makes the input of their parser.
+_FORMATS: dict[str, tuple[str, Callable[[Topic, BagTypes], ParserInput]]] = {
+    CDR: (ROS2MSG, _of_cdr),
+    PROTOBUF: (PROTOBUF, _of_protobuf),
+    ROS1: (PROTOBUF, _of_ros1),
+}
 
 
 class TopicParser:
@@ -163,7 +171,7 @@ class TopicParsers:
         return self._made[key]
 
     def _our_plugin(self, topic: Topic, encoding: str) -> Plugin:
-        if encoding not in (PROTOBUF, ROS2MSG):
+        if encoding not in (known for known, _ in _FORMATS.values()):
             raise BagError(
                 f"topic {topic.name}: its messages are {encoding}, for which there is no plugin here; give one to "
                 "`plotjuggler run`"
@@ -175,8 +183,8 @@ class TopicParsers:
 
 def encodings(topic: Topic) -> tuple[str, ...]:
     """Return the encodings that a plugin for a topic may name: that of its messages, or that of its schema."""
-    known = {CDR: (ROS2MSG,), PROTOBUF: (PROTOBUF,), ROS1: (PROTOBUF,)}
-    return known.get(topic.serialization_format, (topic.serialization_format, topic.definition.encoding))
+    known = _FORMATS.get(topic.serialization_format)
+    return (known[0],) if known else (topic.serialization_format, topic.definition.encoding)
 
 
 def is_for(plugin: Plugin, topic: Topic) -> bool:

@@ -10,9 +10,15 @@ from rosidl_adapter_proto.plotjuggler.plugins import plugin_path
 from tests.plotjuggler.topics import ENCODINGS
 
 
+@pytest.fixture(params=ENCODINGS)
+def encoding(request: pytest.FixtureRequest) -> str:
+    """The encoding of each of our plugins, for tests that are of all of them."""
+    return str(request.param)
+
+
 @pytest.fixture
 def plugin(encoding: str) -> Path:
-    """The plugin for the messages of an encoding, which the test has as a parameter."""
+    """The plugin for the messages of an encoding."""
     return plugin_path(encoding)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.plotjuggler.released_host import ReleasedHost, ReleasedParser
-from tests.plotjuggler.topics import ENCODINGS, topics
+from tests.plotjuggler.topics import topics
 
 GOOD, DECLINED, FAILED, NO_INSTANCE, MALFORMED, NO_CLAIM = 0, 1, -1, -2, -3, -4
 SCALAR, OBJECT = 1, 2
@@ -78,11 +78,6 @@ def read_scalars(output: bytes) -> list[tuple[str, float | str]]:
             place += layout.size
         pairs.append((name, value))
     return pairs
-
-
-@pytest.fixture(params=ENCODINGS)
-def encoding(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
 
 
 @pytest.fixture

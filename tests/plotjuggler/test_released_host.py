@@ -21,11 +21,6 @@ RULE = "=" * 80
 DEEPEST = 100
 
 
-@pytest.fixture(params=ENCODINGS)
-def encoding(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
 @pytest.fixture
 def host(plugin: Path) -> ReleasedHost:
     return ReleasedHost(plugin)
